@@ -39,14 +39,23 @@ void HealthMonitor::count_reason(std::string_view channel, wire::Reason reason,
 }
 
 void HealthMonitor::set_sequence(std::size_t channel, const SequenceCounts& counts) {
-  if (counts.gaps > channels_[channel].sequence.gaps) reasons_.add_degraded();
-  channels_[channel].sequence = counts;
+  Channel& one = channels_[channel];
+  if (counts.gaps > one.sequence.gaps) {
+    reasons_.add_degraded("messages_lost", one.name + ": messages that did not arrive: " +
+                                               std::to_string(counts.lost) + " so far");
+  }
+  one.sequence = counts;
 }
 
 void HealthMonitor::set_dropped(std::size_t channel, std::uint64_t dropped) {
   const auto now = static_cast<std::int64_t>(dropped);
-  if (now > channels_[channel].dropped) reasons_.add_degraded();
-  channels_[channel].dropped = now;
+  Channel& one = channels_[channel];
+  if (now > one.dropped) {
+    reasons_.add_degraded(to_string(wire::Reason::kQueueFull),
+                          one.name + ": more came than could be handled: " + std::to_string(now) +
+                              " messages dropped so far");
+  }
+  one.dropped = now;
 }
 
 std::int8_t HealthMonitor::state() const {

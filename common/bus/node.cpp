@@ -100,9 +100,7 @@ bool Node::admit(Input& input, const BusMessage& message) {
 
   monitor_.count_message(input.health, header.utime);
   if (!is_recovering() && input.options.journaled) {
-    if (const auto refusal = state_.append(input.channel, message.bytes)) {
-      report(refusal->reason, refusal->detail);
-    }
+    show_kept(state_.append(input.channel, message.bytes));
   }
   return true;
 }

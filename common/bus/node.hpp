@@ -135,11 +135,14 @@ class Node {
 
   // For the drivers.
 
-  /// `save` and `load` of the stage.
-  void keep_state(std::function<std::string()> save, std::function<void(const std::string&)> load);
+  /// `save`, `load` and `state_was_lost` of the stage; see Adapter.
+  void keep_state(std::function<std::string()> save, std::function<void(const std::string&)> load,
+                  std::function<void(std::int64_t)> lost);
   /// Loads the snapshot and feeds the journal, publishing nothing. False: the state could not be
   /// loaded; the stage may be half loaded and must be made anew.
   bool recover(StateStore& store);
+  /// Where no snapshot is left of a state that was there, the stage is told.
+  void tell_of_loss(const StateStore& store);
   /// From now on inputs are written to the store before they are handled.
   void journal_to(StateStore* store) { state_.journal_to(store); }
   /// Saves the state, where there is a store. A failure is reported.
@@ -196,6 +199,7 @@ class Node {
   struct Stage {
     std::function<std::string()> save;
     std::function<void(const std::string&)> load;
+    std::function<void(std::int64_t)> lost;
   };
 
   void add_input(const std::string& channel, Take take, SubscribeOptions options);
@@ -212,6 +216,7 @@ class Node {
   void send(Output& output, model::Utime utime, const wire::Bytes& bytes,
             const wire::WireType& type);
   bool is_recovering() const { return source_ == Source::kJournal; }
+  void show_kept(const std::optional<wire::Refusal>& refusal);
   std::string save_state() const;
   void load_state(const std::string& bytes);
 

@@ -8,8 +8,17 @@
 namespace understory::bus {
 
 void Node::keep_state(std::function<std::string()> save,
-                      std::function<void(const std::string&)> load) {
-  stage_ = {std::move(save), std::move(load)};
+                      std::function<void(const std::string&)> load,
+                      std::function<void(std::int64_t)> lost) {
+  stage_ = {std::move(save), std::move(load), std::move(lost)};
+}
+
+void Node::tell_of_loss(const StateStore& store) {
+  const std::optional<std::int64_t> written_s = store.lost_snapshot_s();
+  if (!written_s || !stage_.lost) return;
+  stage_.lost(*written_s);
+  log(Level::kWarning, to_string(wire::Reason::kSnapshotDamaged),
+      "an earlier state is lost: nothing of it is gone on with");
 }
 
 std::string Node::save_state() const {
@@ -58,7 +67,11 @@ bool Node::recover(StateStore& store) {
   source_ = Source::kJournal;
   announcer_.mute(true);
   try {
-    if (recovered.snapshot) load_state(*recovered.snapshot);
+    if (recovered.snapshot) {
+      load_state(*recovered.snapshot);
+    } else {
+      tell_of_loss(store);
+    }
     for (const JournalEvent& event : recovered.events) feed({event.channel, event.bytes, 0});
   } catch (const std::exception& error) {
     recovered.problems.push_back({wire::Reason::kSnapshotDamaged, error.what()});
@@ -69,7 +82,11 @@ bool Node::recover(StateStore& store) {
   store.end_recovery();
 
   // Report what was lost and what was found.
-  for (const wire::Refusal& problem : recovered.problems) report(problem.reason, problem.detail);
+  if (store.needs_snapshot()) state_.start_failed();
+  for (const wire::Refusal& problem : recovered.problems) {
+    problem.reason == wire::Reason::kStateNotKept ? show_kept(problem)
+                                                  : report(problem.reason, problem.detail);
+  }
   if (is_loaded && (recovered.snapshot || !recovered.events.empty())) {
     log(Level::kInfo, "recovered",
         "state of utime " + std::to_string(state_.saved_utime()) + " and " +
@@ -80,8 +97,23 @@ bool Node::recover(StateStore& store) {
 }
 
 void Node::save_snapshot() {
-  if (const auto refusal = state_.save(now(), [this] { return save_state(); })) {
+  show_kept(state_.save(now(), [this] { return save_state(); }));
+}
+
+/// A state that is not kept is a condition of the process until a snapshot is saved.
+void Node::show_kept(const std::optional<wire::Refusal>& refusal) {
+  constexpr wire::Reason kReason = wire::Reason::kStateNotKept;
+  const bool holds = state_.is_failing();
+  const bool has_changed = monitor_.set_condition(
+      "", kReason, holds, refusal ? refusal->detail : "the state directory cannot be written");
+
+  // A condition that begins is counted as it is set.
+  if (refusal && holds && has_changed) {
+    announcer_.report(now(), kReason, refusal->detail, {});
+  } else if (refusal) {
     report(refusal->reason, refusal->detail);
+  } else if (has_changed) {
+    log(Level::kInfo, to_string(kReason), "the state is kept again");
   }
 }
 

@@ -33,7 +33,6 @@ Severity severity(wire::Reason reason) {
     case wire::Reason::kLate:
       return Severity::kNote;
     case wire::Reason::kStageFailed:
-    case wire::Reason::kStateNotKept:
     case wire::Reason::kLost:
     case wire::Reason::kDiverged:
       return Severity::kError;
@@ -57,6 +56,13 @@ void ReasonCounts::add(std::string_view channel, wire::Reason reason, std::strin
   last_text_utime_ = clock_.wall_us();
 }
 
+void ReasonCounts::add_degraded(std::string_view code, std::string_view text) {
+  last_degraded_us_ = clock_.monotonic_us();
+  last_code_ = code;
+  last_text_ = text;
+  last_text_utime_ = clock_.wall_us();
+}
+
 bool ReasonCounts::hold(std::string_view channel, wire::Reason reason, std::string_view text) {
   const auto [entry, is_new] = holding_.try_emplace({std::string(channel), reason}, text);
   if (is_new) add(channel, reason, text);
@@ -75,10 +81,8 @@ void ReasonCounts::set_refused(const DatagramFaults& faults) {
 
     counts_[{std::string(), std::string(to_string(fault))}] = count;
     if (!is_harmful(fault)) continue;
-    last_degraded_us_ = clock_.monotonic_us();
-    last_code_ = to_string(fault);
-    last_text_ = "datagrams that are no message of LCM: " + std::to_string(count) + " so far";
-    last_text_utime_ = clock_.wall_us();
+    add_degraded(to_string(fault),
+                 "datagrams that are no message of LCM: " + std::to_string(count) + " so far");
   }
   refused_ = faults;
 }

@@ -44,8 +44,9 @@ class ReasonCounts {
   /// Sets how many datagrams the bus refused so far; an increase of a harmful one becomes the
   /// last reason.
   void set_refused(const DatagramFaults& faults);
-  /// Something is missing that has no reason of its own: a gap, a full queue.
-  void add_degraded() { last_degraded_us_ = clock_.monotonic_us(); }
+  /// Something is missing that is counted elsewhere (by channel, by datagram): it is the last
+  /// reason, of this code. `text` is for a person.
+  void add_degraded(std::string_view code, std::string_view text);
 
   /// The worst severity that is fresh or of a condition that holds; kNote = nothing is.
   Severity fresh() const;

@@ -145,6 +145,7 @@ std::unique_ptr<StateStore> recover_state(std::unique_ptr<HostedService>& hosted
     // The stage may be half loaded: a new one.
     store->start_over();
     hosted = make_hosted(service, bus, clock, toml, options);
+    hosted->node().tell_of_loss(*store);
     hosted->node().report(wire::Reason::kSnapshotDamaged,
                           "the state cannot be used; starting fresh");
   }

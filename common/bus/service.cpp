@@ -66,7 +66,8 @@ HostedService::HostedService(const Service& service, Bus& bus, const Clock& cloc
   node_ = std::make_unique<Node>(bus, node_options(service.name, runtime_), clock);
   adapter_->bind(*node_);
   node_->keep_state([this] { return adapter_->save(); },
-                    [this](const std::string& state) { adapter_->load(state); });
+                    [this](const std::string& state) { adapter_->load(state); },
+                    [this](std::int64_t written_s) { adapter_->state_was_lost(written_s); });
 }
 
 }  // namespace understory::bus

@@ -2,6 +2,7 @@
 // channels, and can save itself.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -25,6 +26,11 @@ class Adapter {
   virtual std::string save() const { return {}; }
   /// Takes what save() gave. Throws where it cannot; the adapter is then thrown away.
   virtual void load(const std::string& /*state*/) {}
+  /// Before the first input: an earlier process left a state that cannot be used. What that process
+  /// published is still known to others, so numbers must not begin anew. `written_s`: when the
+  /// state was written [s since 1970]; grows with each state that is lost, and is the same again
+  /// until a snapshot of the new state is saved.
+  virtual void state_was_lost(std::int64_t /*written_s*/) {}
 };
 
 /// A service by name, and how to make its adapter.

@@ -9,7 +9,9 @@ std::optional<wire::Refusal> StateKeeper::append(std::string_view channel,
   if (store_ == nullptr) return std::nullopt;
   ++events_;
   if (store_->needs_snapshot()) return std::nullopt;
-  return store_->append(channel, bytes);
+  const auto refusal = store_->append(channel, bytes);
+  if (refusal) is_failing_ = true;
+  return refusal;
 }
 
 bool StateKeeper::is_due(std::int64_t now) {
@@ -28,6 +30,7 @@ std::optional<wire::Refusal> StateKeeper::save(std::int64_t now,
                                                const std::function<std::string()>& make_state) {
   if (store_ == nullptr || now < 0) return std::nullopt;
   tried_utime_ = now;
+  is_failing_ = true;
   try {
     if (auto refusal = store_->save(make_state())) return refusal;
   } catch (const std::exception& error) {
@@ -36,6 +39,7 @@ std::optional<wire::Refusal> StateKeeper::save(std::int64_t now,
 
   resume(now);
   events_ = 0;
+  is_failing_ = false;
   return std::nullopt;
 }
 

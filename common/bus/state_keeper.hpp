@@ -22,11 +22,17 @@ class StateKeeper {
       : every_us_(every_us), every_events_(every_events) {}
 
   /// From now on inputs go to the store, which must outlive the keeper; null = none.
-  void journal_to(StateStore* store) { store_ = store; }
+  void journal_to(StateStore* store) {
+    store_ = store;
+    if (store != nullptr && store->needs_snapshot()) is_failing_ = true;
+  }
   /// The state of time `utime` was loaded.
   void resume(std::int64_t utime) { saved_utime_ = period_start_ = utime; }
   /// This many inputs were fed since that state.
   void set_events(int events) { events_ = events; }
+
+  /// The store could not be opened for writing: as after a refusal.
+  void start_failed() { is_failing_ = true; }
 
   /// Journals an input before it is handled. A refusal: the device fails.
   std::optional<wire::Refusal> append(std::string_view channel,
@@ -38,6 +44,8 @@ class StateKeeper {
   std::optional<wire::Refusal> save(std::int64_t now,
                                     const std::function<std::string()>& make_state);
 
+  /// Whether something could not be kept, and no snapshot has made up for it yet.
+  bool is_failing() const { return is_failing_; }
   /// Time of the last state saved or loaded; -1 = none.
   std::int64_t saved_utime() const { return saved_utime_; }
   /// Size of the journal; 0 without a store.
@@ -51,6 +59,7 @@ class StateKeeper {
   std::int64_t tried_utime_ = -1;
   std::int64_t period_start_ = -1;
   int events_ = 0;  // since the snapshot
+  bool is_failing_ = false;
 };
 
 }  // namespace understory::bus

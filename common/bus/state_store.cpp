@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -39,9 +40,14 @@ std::optional<std::string> read_file(const fs::path& file) {
   return text;
 }
 
+/// By errno. Where the folder is missing the cause is why it cannot be made; a folder that was
+/// removed is there for the next attempt.
 wire::Refusal not_kept(const fs::path& file) {
-  return {wire::Reason::kStateNotKept,
-          file.string() + ": " + std::system_category().message(errno)};
+  std::error_code why(errno, std::system_category());
+  std::error_code not_made;
+  if (errno == ENOENT) fs::create_directories(file.parent_path(), not_made);
+  if (not_made) why = not_made;
+  return {wire::Reason::kStateNotKept, file.string() + ": " + why.message()};
 }
 
 bool write_all(int file, std::string_view bytes) {
@@ -83,6 +89,8 @@ void StateStore::lock() {
   std::error_code ignored;
   fs::create_directories(directory_, ignored);
   lock_ = ::open(path(".lock").c_str(), O_RDWR | O_CREAT | kOwn, 0644);
+  // On a disk that has become read-only, an existing file can be locked all the same.
+  if (lock_ < 0 && errno == EROFS) lock_ = ::open(path(".lock").c_str(), O_RDONLY | kOwn);
   // Where no file can be made, no journal can be either: open() reports that.
   if (lock_ < 0) return;
   if (::flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
@@ -109,6 +117,14 @@ fs::path StateStore::journal_path(std::uint64_t generation) const {
 void StateStore::put_aside(const fs::path& file) {
   std::error_code ignored;
   if (fs::exists(file, ignored)) fs::rename(file, file.string() + ".damaged", ignored);
+}
+
+std::optional<std::int64_t> StateStore::lost_snapshot_s() const {
+  struct stat lost {};
+  struct stat newer {};
+  if (::stat(path(".snapshot").c_str(), &newer) == 0) return std::nullopt;
+  if (::lstat(path(".snapshot.damaged").c_str(), &lost) != 0) return std::nullopt;
+  return lost.st_mtim.tv_sec;
 }
 
 void StateStore::refuse_what_killed_before(Recovered& recovered) {
@@ -227,6 +243,7 @@ std::optional<wire::Refusal> StateStore::append(std::string_view channel,
 }
 
 std::optional<wire::Refusal> StateStore::save(std::string_view state) {
+  lock();  // Where the directory could not be made before, it may be possible now.
   if (auto refusal = replace_file(path(".snapshot"), encode_snapshot(generation_ + 1, state))) {
     return refusal;
   }

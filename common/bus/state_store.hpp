@@ -56,11 +56,14 @@ class StateStore {
   std::optional<wire::Refusal> append(std::string_view channel,
                                       std::span<const std::uint8_t> bytes);
   /// Writes a snapshot, which replaces the one before and its journal. Refused as kStateNotKept
-  /// where the device fails; the one before then stays.
+  /// where the device fails; the one before then stays. Throws as open() does.
   std::optional<wire::Refusal> save(std::string_view state);
 
   /// True after a failed append: the journal has a hole, only a snapshot makes the state whole.
   bool needs_snapshot() const { return journal_broken_; }
+  /// Where a snapshot was put aside and none has been saved since: when it was written [s since
+  /// 1970].
+  std::optional<std::int64_t> lost_snapshot_s() const;
   /// Size of the journal [bytes].
   std::uint64_t journal_bytes() const { return journal_bytes_; }
 

@@ -48,6 +48,13 @@ std::size_t FileWindow::read_some(std::uint64_t offset, std::span<std::uint8_t> 
   return done;
 }
 
+std::uint64_t FileWindow::data_from(std::uint64_t offset) const {
+  if (offset >= size_) return size_;
+  const off_t data = ::lseek(descriptor_, static_cast<off_t>(offset), SEEK_DATA);
+  if (data < 0) return errno == ENXIO ? size_ : offset;
+  return std::min(static_cast<std::uint64_t>(data), size_);
+}
+
 bool FileWindow::contains(std::uint64_t offset, std::size_t count) const {
   return offset >= window_offset_ && offset + count <= window_offset_ + window_bytes_;
 }

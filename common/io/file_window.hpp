@@ -26,6 +26,10 @@ class FileWindow {
   /// that looking ahead costs no more than what it reads.
   bool read(std::uint64_t offset, std::span<std::uint8_t> out);
 
+  /// Where the file's next data is, at or behind `offset`: a hole in between takes no room on the
+  /// device. The size of the file when there is none; `offset` where the file system does not tell.
+  std::uint64_t data_from(std::uint64_t offset) const;
+
   static constexpr std::size_t kWindowBytes = 256 * 1024;
 
  private:

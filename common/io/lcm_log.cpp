@@ -4,11 +4,30 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 
 #include "common/io/file_window.hpp"
 #include "common/io/lcm_log_format.hpp"
 
 namespace understory::io {
+namespace {
+
+/// Where the magic number is in these bytes. Garbage is searched as fast as memory is read.
+std::optional<std::size_t> magic_in(std::span<const std::uint8_t> bytes) {
+  const std::uint8_t* at = bytes.data();
+  const std::uint8_t* const end = at + bytes.size();
+  while (at != end) {
+    const auto left = static_cast<std::size_t>(end - at);
+    at = static_cast<const std::uint8_t*>(std::memchr(at, kMagicBytes[0], left));
+    if (at == nullptr || static_cast<std::size_t>(end - at) < kMagicBytes.size()) break;
+    if (std::equal(kMagicBytes.begin(), kMagicBytes.end(), at))
+      return static_cast<std::size_t>(at - bytes.data());
+    ++at;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
 
 class LcmLogReader::Impl {
  public:
@@ -92,13 +111,12 @@ class LcmLogReader::Impl {
   }
 
   /// Where the magic number next occurs, at or behind `offset`; the size of the file when nowhere.
+  /// Holes of the file are passed over: they read as zeros, of which the number has none.
   std::uint64_t find_magic(std::uint64_t offset) {
-    constexpr std::size_t kStep = 4096;
-    while (offset < file_.size()) {
+    constexpr std::size_t kStep = 65536;
+    while ((offset = file_.data_from(offset)) < file_.size()) {
       const auto bytes = file_.peek(offset, kStep);
-      const auto hit =
-          std::search(bytes.begin(), bytes.end(), kMagicBytes.begin(), kMagicBytes.end());
-      if (hit != bytes.end()) return offset + static_cast<std::uint64_t>(hit - bytes.begin());
+      if (const auto at = magic_in(bytes)) return offset + *at;
       if (bytes.size() < kStep) return file_.size();
       offset += kStep - (kMagicBytes.size() - 1);
     }

@@ -42,19 +42,31 @@ void HttpSession::read() {
   parser_.emplace();
   parser_->header_limit(kMostHeaderBytes);
   parser_->body_limit(kMostBodyBytes);
+  waiting_ = std::chrono::steady_clock::now();
   stream_.expires_after(std::chrono::seconds(options_.request_timeout_s));
   http::async_read(stream_, buffer_, *parser_,
                    [self = shared_from_this()](const beast::error_code& error,
                                                std::size_t /*bytes*/) { self->on_read(error); });
 }
 
+void HttpSession::give_way() {
+  shared_->count(&ServerCounts::gave_way);
+  waiting_.reset();
+  beast::error_code ignored;
+  stream_.socket().close(ignored);
+}
+
 void HttpSession::on_read(const beast::error_code& error) {
+  waiting_.reset();
   if (!error) {
     shared_->count(&ServerCounts::requests);
     answer(parser_->get());
     return;
   }
-  if (error == http::error::end_of_stream || error == boost::asio::error::connection_reset) return;
+  if (error == http::error::end_of_stream || error == boost::asio::error::connection_reset ||
+      error == boost::asio::error::operation_aborted) {
+    return;
+  }
   if (error == beast::error::timeout) {
     // A browser keeps idle connections: only half a request is slow.
     if (parser_->got_some()) shared_->count(&ServerCounts::too_slow);

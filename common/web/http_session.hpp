@@ -4,6 +4,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -32,6 +33,10 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
 
   /// Waits for a request.
   void read();
+  /// Since when it waits for a request that is not whole yet; none while one is answered.
+  std::optional<std::chrono::steady_clock::time_point> waiting_since() const { return waiting_; }
+  /// Ends it: its place is needed.
+  void give_way();
 
  private:
   using Response = boost::beast::http::response<boost::beast::http::string_body>;
@@ -46,6 +51,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   std::shared_ptr<SharedState> shared_;
   Upgrade upgrade_;
   std::function<void()> ended_;
+  std::optional<std::chrono::steady_clock::time_point> waiting_;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
 };

@@ -8,6 +8,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <csignal>
+#include <list>
 #include <thread>
 #include <unordered_map>
 #include <unordered_set>
@@ -111,21 +112,34 @@ class Server::Impl {
 
   void take(tcp::socket socket) {
     shared_->count(&ServerCounts::connections);
-    if (connections_ + sockets_.size() >= options_.most_connections) {
+    if (sessions_.size() + sockets_.size() >= options_.most_connections && !make_room()) {
       shared_->count(&ServerCounts::too_many);
       return;
     }
     boost::system::error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
-    ++connections_;
-    std::make_shared<HttpSession>(
+    const auto place = sessions_.emplace(sessions_.end());
+    const auto session = std::make_shared<HttpSession>(
         std::move(socket), options_, shared_,
         [this](boost::beast::tcp_stream stream, const SocketSession::Request& request,
                const SocketPath& path, std::string subprotocol) {
           open_socket(std::move(stream), request, path, std::move(subprotocol));
         },
-        [this] { --connections_; })
-        ->read();
+        [this, place] { sessions_.erase(place); });
+    *place = session;
+    session->read();
+  }
+
+  /// Half a request, dripped in slowly, costs its sender nothing: it must not keep others out.
+  bool make_room() {
+    std::shared_ptr<HttpSession> slowest;
+    for (const auto& one : sessions_) {
+      const auto session = one.lock();
+      if (!session || !session->waiting_since()) continue;
+      if (!slowest || session->waiting_since() < slowest->waiting_since()) slowest = session;
+    }
+    if (slowest) slowest->give_way();
+    return slowest != nullptr;
   }
 
   void open_socket(boost::beast::tcp_stream stream, const SocketSession::Request& request,
@@ -147,7 +161,7 @@ class Server::Impl {
   // before it.
   ServerOptions options_;
   std::shared_ptr<SharedState> shared_ = std::make_shared<SharedState>();
-  std::size_t connections_ = 0;  ///< Not yet WebSockets.
+  std::list<std::weak_ptr<HttpSession>> sessions_;  ///< Not yet WebSockets.
   ClientId last_client_ = 0;
   std::unordered_map<ClientId, std::shared_ptr<SocketSession>> sockets_;
   std::uint16_t port_ = 0;

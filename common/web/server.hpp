@@ -50,6 +50,8 @@ struct ServerOptions {
   /// whose name is made to lead here is not answered.
   std::vector<std::string> host_names;
   std::vector<SocketPath> sockets;
+  /// When there are so many, the one that waits longest for a whole request gives way to a new one;
+  /// where none waits, the new one is refused.
   std::size_t most_connections = 64;
   /// A client that has not taken so many bytes is closed.
   std::size_t most_unsent_bytes = std::size_t{32} << 20U;
@@ -85,12 +87,14 @@ struct ServerCounts {
   std::uint64_t too_large = 0;       ///< Headers, bodies or messages.
   std::uint64_t too_slow = 0;        ///< Requests that were not whole in time.
   std::uint64_t too_many = 0;        ///< Connections above the limit.
-  std::uint64_t overrun = 0;         ///< Closed: they did not take what was sent.
+  std::uint64_t gave_way = 0;  ///< Closed for a newer one: waited longest for a whole request.
+  std::uint64_t overrun = 0;   ///< Closed: they did not take what was sent.
   bool operator==(const ServerCounts&) const = default;
 
   /// Sum of what was refused.
   std::uint64_t refused() const {
-    return refused_host + refused_origin + malformed + too_large + too_slow + too_many + overrun;
+    return refused_host + refused_origin + malformed + too_large + too_slow + too_many + gave_way +
+           overrun;
   }
 };
 

@@ -9,6 +9,7 @@
 
 #include "common/bus/launch_config.hpp"
 #include "common/bus/service.hpp"
+#include "common/bus/split_bus.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/printable.hpp"
 #include "deploy/cli/commands.hpp"
@@ -83,8 +84,10 @@ void look_at_bus(const std::string& url, std::vector<Finding>& findings) {
   const std::string complete = bus::complete_lcm_url(url);
   add(route_findings(bus::parse_udpm_url(complete), whole_text("/proc/net/route"),
                      whole_text("/sys/class/net/lo/flags")));
-  findings.push_back(multicast_finding(url));
+  findings.push_back(multicast_finding(complete));
   if (findings.back().verdict == Verdict::kBad) return;
+  findings.push_back(multicast_finding(bus::bulk_lcm_url(complete)));
+  findings.back().subject = "multicast of sweeps";
 
   const auto start = DoctorClock::now();
   const auto start_by_clock = std::chrono::system_clock::now();

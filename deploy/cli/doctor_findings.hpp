@@ -34,7 +34,7 @@ std::vector<Finding> url_findings(const std::string& url);
 std::vector<Finding> route_findings(const bus::UdpmUrl& group, const std::string& routes,
                                     const std::string& lo_flags);
 /// A message of our own, sent and received over the real socket; a port that another program keeps
-/// for itself shows here, with its name.
+/// for itself shows here, with its name. To be asked for both groups: that of sweeps is beside.
 Finding multicast_finding(const std::string& url);
 
 /// Processors, memory, the processors' governor.

@@ -21,8 +21,10 @@ using Latest = std::map<std::pair<std::string, std::int64_t>, health_t>;
 
 void name_findings(const Latest& latest, std::vector<Finding>& findings) {
   std::map<std::string, std::string> pids;
-  for (const auto& [key, health] : latest)
+  for (const auto& [key, health] : latest) {
+    if (key.second <= 0) continue;  // The supervisor speaks for one that it gave up.
     pids[key.first] += fmt::format("{}{}", pids[key.first].empty() ? "" : ", ", key.second);
+  }
   for (const auto& [name, list] : pids) {
     if (list.find(',') == std::string::npos) continue;
     findings.push_back({Verdict::kBad, "processes",

@@ -9,15 +9,19 @@
 #include <csignal>
 #include <memory>
 #include <optional>
+#include <regex>
 
 #include "common/bus/device.hpp"
 #include "common/bus/launch_config.hpp"
+#include "common/bus/live_bus.hpp"
 #include "common/bus/parameter_table.hpp"
+#include "common/bus/split_bus.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/given_map_option.hpp"
 #include "deploy/cli/health_listener.hpp"
 #include "deploy/cli/launch_report.hpp"
+#include "deploy/cli/launch_voice.hpp"
 #include "deploy/cli/paths.hpp"
 #include "deploy/launch/registry.hpp"
 #include "deploy/launch/supervisor.hpp"
@@ -112,21 +116,44 @@ std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options,
   return specs;
 }
 
-/// Everything but what people keep.
-void forget_state(const std::filesystem::path& folder) {
+/// Whether the processes make files of this name as their saved state.
+bool is_state_file(const std::filesystem::directory_entry& entry) {
+  static const std::regex pattern(
+      R"([A-Za-z0-9_-]+\.(snapshot|journal\.[0-9]+|recovering)(\.new)?(\.damaged)?|given_map\.toml)");
+  const std::string name = entry.path().filename().string();
+  return std::regex_match(name, pattern) && (entry.is_symlink() || !entry.is_directory());
+}
+
+/// Deletes saved state and nothing else: the folder may be a link to one that holds more.
+void forget_state(const std::filesystem::path& folder, LaunchReport& report) {
   if (!std::filesystem::exists(folder)) return;
   std::vector<std::filesystem::path> gone;
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (entry.path().filename() != bus::kKeptFolder) gone.push_back(entry.path());
-  for (const auto& one : gone) std::filesystem::remove_all(one);
+  std::size_t others = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const auto name = entry.path().filename();
+    if (is_state_file(entry)) {
+      gone.push_back(entry.path());
+    } else if (name != bus::kKeptFolder && name.extension() != ".lock") {
+      ++others;
+    }
+  }
+
+  for (const auto& one : gone) std::filesystem::remove(one);
+  if (others == 0) return;
+  report.add("launch", fmt::format("--fresh: {}: {} files that are no saved state stay there",
+                                   folder.string(), others));
 }
 
 /// A directory for each process's state; only under the lock, since others may be using them, and
-/// on a bus that can be heard: a launch that cannot run deletes nothing.
-void prepare_state(const LaunchOptions& options, const launch::Supervisor& supervisor) {
+/// on a bus that can be heard: a launch that cannot run deletes nothing. Where a directory cannot
+/// be made, its process says so in HEALTH. Throws std::filesystem::filesystem_error where --fresh
+/// cannot delete a state, which would be gone on with.
+void prepare_state(const LaunchOptions& options, const launch::Supervisor& supervisor,
+                   LaunchReport& report) {
   for (const auto& process : supervisor.status()) {
-    if (options.fresh) forget_state(options.state / process.name);
-    std::filesystem::create_directories(options.state / process.name);
+    if (options.fresh) forget_state(options.state / process.name, report);
+    std::error_code ignored;
+    std::filesystem::create_directories(options.state / process.name, ignored);
   }
 }
 
@@ -139,7 +166,8 @@ void prepare_map(const LaunchOptions& options, const std::vector<bus::ProcessEnt
     if (given) {
       keep_layer(folder, entry.config, given->layers.at(entry.name), given->checksum);
     } else {
-      std::filesystem::remove(layer_file(folder));
+      std::error_code ignored;  // One that stays is not read.
+      std::filesystem::remove(layer_file(folder), ignored);
     }
   }
 }
@@ -170,13 +198,22 @@ void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
 HealthListener listen(const LaunchOptions& options, launch::Supervisor& supervisor,
                       LaunchReport& report) {
   return HealthListener(options.lcm_url, [&](const health_t& message) {
-    report.add(message);
+    if (message.pid > 0) report.add(message);  // The others are our own words.
     supervisor.heartbeat(message.process, static_cast<pid_t>(message.pid), Clock::now());
   });
 }
 
+/// Sweeps travel in a group of their own. Throws BusError where another program keeps its port:
+/// now, not at the first sweep.
+void check_group_of_sweeps(const std::string& lcm_url) {
+  const std::string url = bus::complete_lcm_url(lcm_url);
+  const std::string sweeps = bus::bulk_lcm_url(url);
+  if (sweeps == url) return;
+  bus::LiveBus(sweeps).subscribe("LAUNCH_LOOKS", 1, [](const bus::BusMessage&) {});
+}
+
 void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopSignals& signals,
-         HealthListener& health, LaunchReport& report) {
+         HealthListener& health, LaunchVoice& voice, LaunchReport& report) {
   std::vector<pid_t> noted;
   while (!supervisor.stopped()) {
     const auto now = Clock::now();
@@ -187,6 +224,7 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
 
     if (!supervisor.refused().empty()) supervisor.stop(now);
     supervisor.step(now);
+    voice.tell(supervisor.status(), now);
     std::vector<pid_t> pids;
     for (const auto& process : supervisor.status()) pids.push_back(process.pid);
 
@@ -218,10 +256,16 @@ void launch_processes(const LaunchOptions& options) {
       process_specs(options, entries), {},
       [&](const std::string& process, const std::string& text) { report.add(process, text); });
   HealthListener health = listen(options, supervisor, report);
-  prepare_state(options, supervisor);
+  check_group_of_sweeps(options.lcm_url);
+  LaunchVoice voice(options.lcm_url);
+  if (const std::string& trouble = registry.trouble(); !trouble.empty()) {
+    report.add("launch", "drives without saved state: " + trouble);
+    voice.warn("state_not_kept", trouble);
+  }
+  prepare_state(options, supervisor, report);
   prepare_map(options, entries, layer);
   supervisor.start(registry.read(), Clock::now());
-  run(supervisor, registry, signals, health, report);
+  run(supervisor, registry, signals, health, voice, report);
 
   if (!options.report.empty()) report.write(options.report, supervisor.status());
   if (!supervisor.refused().empty()) {

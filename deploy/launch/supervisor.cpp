@@ -13,6 +13,12 @@ constexpr int kWrongUsage = 2;  // Exit status of a process that refuses its con
 
 double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
+/// Later by a pause, but not in the future.
+void postpone(std::optional<Clock::time_point>& time, Clock::duration pause,
+              Clock::time_point now) {
+  if (time) time = std::min(*time + pause, now);
+}
+
 }  // namespace
 
 const char* to_string(ProcessState state) {
@@ -44,6 +50,7 @@ Supervisor::Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameter
 }
 
 void Supervisor::start(const std::vector<ProcessStatus>& known, Clock::time_point now) {
+  stepped_ = now;
   for (auto& entry : entries_) {
     const auto before = std::find_if(known.begin(), known.end(), [&](const auto& process) {
       return process.name == entry.spec.name;
@@ -61,7 +68,7 @@ void Supervisor::start(const std::vector<ProcessStatus>& known, Clock::time_poin
     }
 
     entry.state = ProcessState::kRunning;
-    entry.started = now;
+    entry.started = entry.listened_since = now;
     report_(entry.spec.name, fmt::format("adopted (pid {})", entry.child->pid()));
   }
 }
@@ -70,17 +77,13 @@ void Supervisor::launch(Entry& entry, Clock::time_point now) {
   entry.start_due.reset();
   entry.last_heartbeat.reset();
   entry.stopped_since.reset();
-  entry.started = now;
+  entry.started = entry.listened_since = now;
   ++entry.starts;
 
   try {
     entry.child = ChildProcess::start(entry.spec.command);
   } catch (const std::system_error& error) {
-    // Neither the program nor the permission to run it comes back by trying again.
-    entry.state = ProcessState::kGivenUp;
-    entry.last_ending = fmt::format("cannot be started: {}", error.what());
-    report_(entry.spec.name, entry.last_ending);
-    if (entry.starts == 1) refused_.push_back(entry.spec.name);
+    cannot_start(entry, error.what(), now);
     return;
   }
 
@@ -94,6 +97,17 @@ void Supervisor::launch(Entry& entry, Clock::time_point now) {
   }
 }
 
+/// At the first start the installation is wrong; later it is the computer that lacks something
+/// (memory, a disk), which may come back.
+void Supervisor::cannot_start(Entry& entry, const std::string& why, Clock::time_point now) {
+  entry.died = now;
+  entry.last_ending = fmt::format("cannot be started: {}", why);
+  report_(entry.spec.name, entry.last_ending);
+  if (entry.starts > 1) return restart_after_death(entry, now);
+  entry.state = ProcessState::kGivenUp;
+  refused_.push_back(entry.spec.name);
+}
+
 void Supervisor::heartbeat(const std::string& name, pid_t pid, Clock::time_point now) {
   for (auto& entry : entries_) {
     if (entry.spec.name != name || !entry.child || entry.child->pid() != pid) continue;
@@ -101,7 +115,26 @@ void Supervisor::heartbeat(const std::string& name, pid_t pid, Clock::time_point
   }
 }
 
+/// What was sent in a pause may still be on its way, or is lost: nothing follows from not having
+/// heard it.
+void Supervisor::count_pause(Clock::time_point now) {
+  const Clock::duration pause = stepped_ ? now - *stepped_ : Clock::duration(0);
+  stepped_ = now;
+  if (pause <= parameters_.pause) return;
+
+  for (auto& entry : entries_) {
+    postpone(entry.last_heartbeat, pause, now);
+    postpone(entry.stopped_since, pause, now);
+    entry.listened_since = std::min(entry.listened_since + pause, now);
+  }
+  postpone(stop_time_, pause, now);
+  if (pause < std::chrono::seconds(1)) return;
+  report_("launch", fmt::format("did not run for {:.1f} s: not counted as silence of processes",
+                                seconds(pause)));
+}
+
 void Supervisor::step(Clock::time_point now) {
+  count_pause(now);
   for (auto& entry : entries_) {
     if (entry.child) {
       if (const auto ending = entry.child->ended()) bury(entry, *ending, now);
@@ -143,28 +176,46 @@ void Supervisor::bury(Entry& entry, const Ending& ending, Clock::time_point now)
           fmt::format("{} after {:.1f} s", ending.text(), seconds(now - entry.started)));
   if (ending.known && ending.signal == 0 && ending.exit_code == kWrongUsage) {
     entry.state = ProcessState::kGivenUp;
-    if (entry.starts == 1) refused_.push_back(entry.spec.name);
-    report_(entry.spec.name, "refuses its configuration: not started again");
+    if (entry.starts == 1) {
+      refused_.push_back(entry.spec.name);
+      report_(entry.spec.name, "refuses its configuration: not started again");
+    } else {
+      schedule_restart(entry, entry.policy.give_up(), now);
+    }
     return;
   }
 
-  schedule_restart(entry, now);
+  restart_after_death(entry, now);
 }
 
-void Supervisor::schedule_restart(Entry& entry, Clock::time_point now) {
-  const auto backoff = entry.policy.died(now);
-  if (backoff) {
-    entry.state = ProcessState::kWaiting;
-    entry.start_due = now + *backoff;
-    return;
+void Supervisor::restart_after_death(Entry& entry, Clock::time_point now) {
+  const bool was_given_up = entry.policy.is_given_up();
+  const milliseconds wait = entry.policy.died(now, now - entry.started);
+  if (entry.policy.is_given_up() && !was_given_up) {
+    report_(entry.spec.name, fmt::format("given up: {} deaths in {:.0f} s, the last time {}",
+                                         entry.policy.deaths_in_window(),
+                                         seconds(parameters_.restart.window), entry.last_ending));
   }
+  schedule_restart(entry, wait, now);
+}
+
+void Supervisor::schedule_restart(Entry& entry, milliseconds wait, Clock::time_point now) {
+  entry.start_due = now + wait;
+  entry.state = ProcessState::kWaiting;
+  if (!entry.policy.is_given_up()) return;
   entry.state = ProcessState::kGivenUp;
-  report_(entry.spec.name, fmt::format("given up: {} deaths in {:.0f} s, the last time {}",
-                                       entry.policy.deaths_in_window(),
-                                       seconds(parameters_.restart.window), entry.last_ending));
+  report_(entry.spec.name, fmt::format("is tried again in {:.0f} s", seconds(wait)));
+}
+
+void Supervisor::forgive_survivor(Entry& entry, Clock::time_point now) {
+  if (!entry.policy.is_given_up() || now - entry.started < parameters_.restart.window) return;
+  entry.policy.forgive();
+  report_(entry.spec.name, fmt::format("has run for {:.0f} s: no longer given up",
+                                       seconds(parameters_.restart.window)));
 }
 
 void Supervisor::watch(Entry& entry, Clock::time_point now) {
+  forgive_survivor(entry, now);
   if (!entry.child->is_stopped()) {
     entry.stopped_since.reset();
   } else if (!entry.stopped_since) {
@@ -185,7 +236,7 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
   }
 
   const bool is_never_heard =
-      !entry.last_heartbeat && now - entry.started >= parameters_.never_heard_degraded;
+      !entry.last_heartbeat && now - entry.listened_since >= parameters_.never_heard_degraded;
   const bool degraded = stopped_for >= parameters_.stopped_degraded ||
                         silent_for >= parameters_.silent_degraded || is_never_heard;
   if (degraded && entry.state == ProcessState::kRunning) {
@@ -238,7 +289,7 @@ std::vector<int> Supervisor::descriptors() const {
 }
 
 Clock::time_point Supervisor::wake_up(Clock::time_point now) const {
-  Clock::time_point next = now + milliseconds(100);  // Hangs show in no descriptor.
+  Clock::time_point next = now + parameters_.look_every;
   for (const auto& entry : entries_) {
     if (entry.start_due) next = std::min(next, *entry.start_due);
   }
@@ -258,6 +309,7 @@ std::vector<ProcessStatus> Supervisor::status() const {
     }
     status.restarts = entry.starts > 0 ? entry.starts - 1 : 0;
     status.last_ending = entry.last_ending;
+    status.is_given_up = entry.policy.is_given_up();
     result.push_back(std::move(status));
   }
 

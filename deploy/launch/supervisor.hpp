@@ -26,6 +26,9 @@ struct ProcessSpec {
 /// short times. Any other hang shows only as missing HEALTH, which comes once a second: three
 /// missed are DEGRADED, five a hang. Fewer would restart healthy processes on a busy computer. A
 /// process that was never heard is DEGRADED, but not killed: it may be one that has no HEALTH.
+///
+/// Time in which the supervisor itself did not run (it was stopped, the computer was suspended or
+/// overloaded) is no silence of a process: all these times are extended by it.
 struct SupervisorParameters {
   RestartPolicyParameters restart;
   milliseconds stopped_degraded{300};
@@ -34,9 +37,11 @@ struct SupervisorParameters {
   milliseconds silent_restart{5000};
   milliseconds never_heard_degraded{10000};  ///< Since its start.
   milliseconds stop_timeout{900};            ///< From SIGTERM to SIGKILL.
+  milliseconds look_every{100};              ///< At the latest; hangs show in no descriptor.
+  milliseconds pause{300};                   ///< Longer between two steps: it did not run.
 };
 
-/// What a process is doing.
+/// What a process is doing. One that is given up is tried again from time to time.
 enum class ProcessState { kWaiting, kRunning, kDegraded, kFinished, kGivenUp };
 /// "waiting", "running", "degraded", "finished", "given up".
 const char* to_string(ProcessState state);
@@ -48,7 +53,8 @@ struct ProcessStatus {
   pid_t pid = -1;
   std::uint64_t start_ticks = 0;
   std::uint64_t restarts = 0;
-  std::string last_ending;  ///< Empty before the first death.
+  std::string last_ending;   ///< Empty before the first death.
+  bool is_given_up = false;  ///< Too many deaths; until it has run for a whole window.
 };
 
 /// All processes of a launch.
@@ -65,7 +71,7 @@ class Supervisor {
   /// counted.
   void heartbeat(const std::string& name, pid_t pid, Clock::time_point now);
   /// Notices deaths and hangs, starts what is due. Cheap; to be called whenever a descriptor is
-  /// ready and at the latest at wake_up().
+  /// ready and at the latest at wake_up(), after heartbeat() for all HEALTH that waits.
   void step(Clock::time_point now);
   /// Asks every process to end, those that end last when the others have; step() goes on until
   /// stopped().
@@ -91,6 +97,7 @@ class Supervisor {
     std::optional<ChildProcess> child;
     std::optional<Clock::time_point> start_due;
     Clock::time_point started;
+    Clock::time_point listened_since;  ///< Its start, later by the supervisor's pauses since.
     Clock::time_point died;
     std::optional<Clock::time_point> last_heartbeat;
     std::optional<Clock::time_point> stopped_since;
@@ -99,16 +106,21 @@ class Supervisor {
   };
 
   void launch(Entry& entry, Clock::time_point now);
+  void cannot_start(Entry& entry, const std::string& why, Clock::time_point now);
+  void count_pause(Clock::time_point now);
   void ask_to_end(bool last, Clock::time_point now);
   void kill_late(Clock::time_point now);
   bool others_run() const;
   void bury(Entry& entry, const Ending& ending, Clock::time_point now);
-  void schedule_restart(Entry& entry, Clock::time_point now);
+  void schedule_restart(Entry& entry, milliseconds wait, Clock::time_point now);
+  void restart_after_death(Entry& entry, Clock::time_point now);
+  void forgive_survivor(Entry& entry, Clock::time_point now);
   void watch(Entry& entry, Clock::time_point now);
 
   std::vector<Entry> entries_;
   SupervisorParameters parameters_;
   Report report_;
+  std::optional<Clock::time_point> stepped_;  ///< The last time.
   std::optional<Clock::time_point>
       stop_time_;                ///< When processes were asked to end, the last time.
   bool last_are_asked_ = false;  ///< Those that end last, too.

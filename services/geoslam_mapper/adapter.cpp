@@ -18,18 +18,6 @@
 namespace understory::geoslam_mapper {
 namespace {
 
-/// Removes what lies outside the bounds that the request gives.
-void cut(model::WholeMap& map, const map_request_t& request) {
-  const auto is_outside = [&](const Eigen::Vector2d& position) {
-    return position.x() < request.min_m[0] || position.x() > request.max_m[0] ||
-           position.y() < request.min_m[1] || position.y() > request.max_m[1];
-  };
-  std::erase_if(map.landmarks, [&](const auto& one) { return is_outside(one.position_m); });
-  std::erase_if(map.keyframes,
-                [&](const auto& one) { return is_outside(one.map_T_vehicle.translation()); });
-  map.complete = false;
-}
-
 /// Members for which a KEYFRAME has room beside its landmarks; usual are 8.
 constexpr std::size_t kMembers = 64;
 /// Members that may have a detection of each of its landmarks.
@@ -128,6 +116,13 @@ class MapperAdapter : public bus::Adapter {
     memory_ = std::move(memory);
     memory_.given_frame.rebuild();
     show_health();
+  }
+
+  void state_was_lost(std::int64_t written_s) override {
+    const NumbersAfterLoss first = numbers_after_loss(written_s);
+    memory_.jumps.begin_behind(first.resets);
+    // A given map has its number.
+    if (memory_.known.map_id == 0) stage_->begin_with_number(first.map_id);
   }
 
  private:
@@ -448,7 +443,7 @@ class MapperAdapter : public bus::Adapter {
 
   void answer(const map_request_t& request) {
     model::WholeMap map = whole_map();
-    if (request.everything == 0) cut(map, request);
+    if (request.everything == 0) cut_to(request, map);
     maps_.publish(map);
   }
 

@@ -93,4 +93,15 @@ bool displaces_most(const std::vector<model::MapLandmark>& before, const model::
   return 2 * static_cast<std::size_t>(displaced) > before.size();
 }
 
+void cut_to(const map_request_t& request, model::WholeMap& map) {
+  const auto is_outside = [&](const Eigen::Vector2d& position) {
+    return position.x() < request.min_m[0] || position.x() > request.max_m[0] ||
+           position.y() < request.min_m[1] || position.y() > request.max_m[1];
+  };
+  std::erase_if(map.landmarks, [&](const auto& one) { return is_outside(one.position_m); });
+  std::erase_if(map.keyframes,
+                [&](const auto& one) { return is_outside(one.map_T_vehicle.translation()); });
+  map.complete = false;
+}
+
 }  // namespace understory::geoslam_mapper

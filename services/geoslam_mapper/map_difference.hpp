@@ -1,10 +1,11 @@
-// Differences between two versions of the map.
+// Differences between two versions of the map, and parts of it.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
 #include "common/model/slam_output.hpp"
+#include "understory/map_request_t.hpp"
 
 namespace understory::geoslam_mapper {
 
@@ -33,5 +34,8 @@ model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
 /// `distance_m`: the map as a whole has jumped. O(moved * log(map)).
 bool displaces_most(const std::vector<model::MapLandmark>& before, const model::MapDelta& delta,
                     double distance_m);
+
+/// Removes from a map what lies outside the bounds that the request gives. O(map).
+void cut_to(const map_request_t& request, model::WholeMap& map);
 
 }  // namespace understory::geoslam_mapper

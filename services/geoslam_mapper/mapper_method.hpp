@@ -61,6 +61,10 @@ class MapperMethod {
   /// A map to start from (GeoSLAM §4.3.1), frame `map`; call it before the first keyframe.
   virtual void start_with(std::span<const model::MapLandmark> landmarks) = 0;
 
+  /// An empty map begins with this number; call it before everything else. Methods that know one
+  /// map only pass it over.
+  virtual void begin_with_number(std::uint32_t /*map_id*/) {}
+
   /// The pose of every keyframe's base at the present estimate, in order of time; folded keyframes
   /// are reconstructed. With covariances, for about one factorisation, where the method has them.
   virtual std::vector<model::KeyframePose> trajectory() const = 0;

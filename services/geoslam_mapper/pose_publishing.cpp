@@ -70,6 +70,11 @@ void identify_detections(const model::Keyframe& keyframe, model::MapUpdate& upda
     update.detections.push_back({one.member, one.detection, id_of.at(one.landmark)});
 }
 
+NumbersAfterLoss numbers_after_loss(std::int64_t written_s) {
+  const auto seconds = static_cast<std::uint64_t>(std::max<std::int64_t>(written_s, 1));
+  return {1000 + static_cast<std::uint32_t>(seconds / 10 % 30'000), seconds};
+}
+
 void JumpWatch::add(const model::Keyframe& keyframe, const model::MapUpdate& update) {
   if (update.map_id != map_id_) begin_map(update.map_id);
   if (predicted_ && keyframe.previous_T_base) {

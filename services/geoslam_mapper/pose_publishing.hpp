@@ -49,6 +49,17 @@ std::vector<model::SlamPose> poses_of(const model::Keyframe& keyframe,
 /// Fills in what the keyframe's detections are, where it has a place.
 void identify_detections(const model::Keyframe& keyframe, model::MapUpdate& update);
 
+/// With what a mapper begins whose saved state is lost.
+struct NumbersAfterLoss {
+  std::uint32_t map_id =
+      0;  ///< 1000 to 30,999: maps of before count from 1, and 32767 is the last.
+  std::uint64_t resets = 0;  ///< Poses count from here.
+};
+/// Others still know the maps of before: the next one has a number that none of them had, and
+/// `reset_counter` grows. `written_s`: when the lost state was written [s since 1970]; fewer maps
+/// and jumps come in a drive than seconds.
+NumbersAfterLoss numbers_after_loss(std::int64_t written_s);
+
 /// Notices jumps of the keyframes' poses against what the keyframer tracked, and changes of the
 /// map.
 class JumpWatch {
@@ -59,6 +70,8 @@ class JumpWatch {
 
   /// The next keyframe and what became of it.
   void add(const model::Keyframe& keyframe, const model::MapUpdate& update);
+  /// Goes on behind so many jumps of a process whose state is lost.
+  void begin_behind(std::uint64_t count) { count_ = count; }
   /// Number of jumps so far.
   std::uint64_t count() const { return count_; }
   /// The last jump: tracked_T_new of the vehicle; identity where it was a change of the map, of

@@ -92,8 +92,10 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
     std::vector<std::pair<std::string, std::int64_t>> processes;
     for (const auto& [name, entry] : run_.scene().processes().entries())
       processes.emplace_back(name, entry.health.pid);
-    for (const auto& [name, pid] : processes)
+    for (const auto& [name, pid] : processes) {
+      if (pid <= 0) continue;  // HEALTH of the supervisor for one that it gave up.
       run_.scene().processes().take(name, look_at_process(pid), wall_us);
+    }
   }
 
   /// Who comes late has heard no MAP.

@@ -44,6 +44,7 @@ nlohmann::ordered_json counts_json(const web::ServerCounts& counts) {
           {"too_large", counts.too_large},
           {"too_slow", counts.too_slow},
           {"too_many", counts.too_many},
+          {"gave_way", counts.gave_way},
           {"overrun", counts.overrun}};
 }
 

@@ -185,6 +185,44 @@ TEST_CASE("a slow channel and one that is behind need no proof") {
   CHECK(clock.now() < 1070 * kSecond_us);
 }
 
+TEST_CASE("whatever degrades the state of health is its last reason") {
+  std::mt19937_64 random(11);
+  for (int run = 0; run < 200; ++run) {
+    std::int64_t now = 0;
+    HealthMonitor monitor("toy", "1", {[&] { return now + 5; }, [&] { return now; }});
+    const std::size_t channel = monitor.add_channel("IN", false);
+    monitor.ready();
+    SequenceCounts counts;
+    std::uint64_t dropped = 0;
+    for (int step = 0; step < 10; ++step) {
+      now += 10 * ReasonCounts::kFreshUs;
+      CHECK(monitor.state() == health_t::STATE_OK);
+      std::string code;
+      switch (random() % 3) {
+        case 0:
+          ++counts.gaps;
+          counts.lost += 1 + random() % 5;
+          monitor.set_sequence(channel, counts);
+          code = "messages_lost";
+          break;
+        case 1:
+          dropped += 1 + random() % 5;
+          monitor.set_dropped(channel, dropped);
+          code = "queue_full";
+          break;
+        default:
+          monitor.count_reason("IN", wire::Reason::kNotFinite, "x");
+          code = "not_finite";
+      }
+      CHECK(monitor.state() == health_t::STATE_DEGRADED);
+      const health_t report = monitor.report(1);
+      CHECK(report.last_error_code == code);
+      CHECK(report.last_error.starts_with("IN: "));
+      CHECK(report.last_error_utime == now + 5);
+    }
+  }
+}
+
 TEST_CASE("health follows from fresh reasons and recovers") {
   std::int64_t now = 0;
   HealthMonitor monitor("toy", "1", {[&] { return now + 5; }, [&] { return now; }});

@@ -32,8 +32,9 @@ void write(const fs::path& file, const std::string& bytes) {
 
 /// One life of the toy: recovers, takes inputs [from, to), is killed (nothing is saved at the end).
 struct Life {
-  explicit Life(const fs::path& directory, const std::string& toml = "")
-      : hosted(test::toy_service(), bus, no_clock(), toml, "toy.toml"), store(directory, "toy") {
+  explicit Life(const fs::path& directory, const std::string& toml = "",
+                const Clock& clock = no_clock())
+      : hosted(test::toy_service(), bus, clock, toml, "toy.toml"), store(directory, "toy") {
     bus.subscribe("RAW_POSE", 0, [this](const BusMessage& message) {
       poses.push_back(*wire::decode_message<raw_pose_t>(message.bytes));
     });
@@ -182,6 +183,42 @@ TEST_CASE("a directory that cannot be written is reported, and the service runs 
   life.run(0, 5);
   CHECK(life.poses.size() == 5);
   CHECK(life.hosted.node().monitor().count_of("", wire::Reason::kStateNotKept) > 0);
+}
+
+TEST_CASE("a state that is not kept is a condition, and kept again when the device comes back") {
+  const auto expected = uninterrupted(60);
+  for (const int mended : {1, 7, 30, 59}) {
+    const test::Scratch scratch("state");
+    const fs::path device = scratch.path() / "device";
+    write(device, "no directory");  // Root may write everywhere, but not below a file.
+    std::int64_t now = 0;
+    const Clock clock{[&] { return now; }, [&] { return now; }};
+    {
+      Life life(device / "state", "", clock);
+      life.run(0, mended);
+      CHECK(life.poses.size() == static_cast<std::size_t>(mended));
+      now += 1'000'000'000;  // What was only counted is not fresh any more.
+      CHECK(life.hosted.node().monitor().state() == health_t::STATE_DEGRADED);
+      const health_t health = life.hosted.node().health();
+      CHECK(health.last_error_code == "state_not_kept");
+      CHECK_THAT(health.last_error, Catch::Matchers::Contains((device / "state").string()) &&
+                                        Catch::Matchers::Contains("Not a directory"));
+
+      // It comes back; within a second of message time the state is kept, and nothing is lost.
+      fs::remove(device);
+      life.run(mended, mended + 11);
+      now += 1'000'000'000;
+      CHECK(life.hosted.node().monitor().state() == health_t::STATE_OK);
+    }
+    Life second(device / "state");
+    CHECK(second.is_recovered);
+    second.run(mended + 11, mended + 12);
+    REQUIRE(second.poses.size() == 1);
+    if (mended + 11 < 60) {
+      CHECK(wire::encode_bytes(second.poses[0]) ==
+            wire::encode_bytes(expected[static_cast<std::size_t>(mended) + 11]));
+    }
+  }
 }
 
 TEST_CASE("a symbolic link in place of a state file is not followed") {

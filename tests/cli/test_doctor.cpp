@@ -105,6 +105,9 @@ TEST_CASE("doctor finds what is wrong with processes that run", "[cli]") {
 
   CHECK(verdict_on(on_processes({healthy("ekf", 1), healthy("ekf", 7)}), "processes",
                    "ekf runs more than once (processes 1, 7)") == Verdict::kBad);
+  // HEALTH with pid 0 is the supervisor's, for a process that it gave up.
+  CHECK(std::ranges::none_of(on_processes({healthy("ekf", 1), healthy("ekf", 0)}),
+                             [](const Finding& one) { return one.verdict == Verdict::kBad; }));
   auto old = healthy("ekf", 1);
   old.version = "1.0.0";
   CHECK(verdict_on(on_processes({old}), "versions", "1.0.0: ekf") == Verdict::kBad);

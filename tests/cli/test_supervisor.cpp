@@ -5,6 +5,7 @@
 #include <csignal>
 #include <fstream>
 #include <iterator>
+#include <random>
 
 #include "common/bus/launch_config.hpp"
 #include "common/bus/parameter_table.hpp"
@@ -86,13 +87,101 @@ TEST_CASE("hangs are looked for ten times a second, and what is due is in time",
   CHECK(bench.supervisor.wake_up(late) == now + launch::milliseconds(900));
 }
 
-TEST_CASE("a process that always dies is given up with the reason", "[launch]") {
-  Bench bench({shell("a", "exit 3")});
+TEST_CASE("a process that always dies is given up with the reason, and tried at a slow pace",
+          "[launch]") {
+  launch::SupervisorParameters parameters;
+  parameters.restart.slow_retry = launch::milliseconds(400);
+  const TemporaryDirectory directory;
+  const std::string mended = directory / "mended";
+  Bench bench({shell("a", "test -e " + mended + " && exec sleep 1000; exit 3")}, parameters);
   bench.supervisor.start({}, launch::Clock::now());
-  REQUIRE(bench.run_until([&] { return bench.supervisor.stopped(); }));
+  REQUIRE(bench.run_until([&] { return bench.status().is_given_up; }));
   CHECK(bench.status().state == launch::ProcessState::kGivenUp);
   CHECK(bench.status().restarts == 4);
+  CHECK_FALSE(bench.supervisor.stopped());
   CHECK_THAT(bench.said, Contains("given up: 5 deaths") && Contains("status 3"));
+
+  const auto given_up = launch::Clock::now();
+  REQUIRE(bench.run_until([&] { return bench.status().restarts == 6; }));
+  CHECK(launch::Clock::now() - given_up >= launch::milliseconds(790));
+  CHECK(bench.said.find("given up: ") == bench.said.rfind("given up: "));
+
+  // The cause ends: the next try lives.
+  REQUIRE(bench.run_until([&] { return bench.status().state == launch::ProcessState::kGivenUp; }));
+  std::ofstream(mended) << "yes";
+  REQUIRE(bench.run_until([&] { return bench.status().restarts == 7; }));
+  ::poll(nullptr, 0, 500);
+  bench.supervisor.step(launch::Clock::now());
+  CHECK(bench.status().restarts == 7);
+  CHECK(bench.status().state == launch::ProcessState::kRunning);
+}
+
+TEST_CASE("what was given up and has run for a window is sound again", "[launch]") {
+  launch::SupervisorParameters parameters;
+  parameters.restart.slow_retry = launch::milliseconds(50);
+  const TemporaryDirectory directory;
+  const std::string mended = directory / "mended";
+  Bench bench({shell("a", "test -e " + mended + " && exec sleep 1000; exit 3")}, parameters);
+  bench.supervisor.start({}, launch::Clock::now());
+  REQUIRE(bench.run_until([&] { return bench.status().is_given_up; }));
+  std::ofstream(mended) << "yes";
+  REQUIRE(bench.run_until([&] { return bench.status().state == launch::ProcessState::kRunning; }));
+
+  // The clock is the caller's: half a minute goes by in steps.
+  auto now = launch::Clock::now();
+  for (int i = 0; i < 290; ++i) bench.supervisor.step(now += launch::milliseconds(100));
+  CHECK(bench.status().is_given_up);
+  for (int i = 0; i < 20; ++i) bench.supervisor.step(now += launch::milliseconds(100));
+  CHECK_FALSE(bench.status().is_given_up);
+  CHECK_THAT(bench.said, Contains("a: has run for 30 s: no longer given up"));
+}
+
+TEST_CASE("a pause of the supervisor is no silence of its processes", "[launch]") {
+  std::mt19937_64 random(7);
+  Bench bench({shell("a", "exec sleep 1000")});
+  auto now = launch::Clock::now();
+  bench.supervisor.start({}, now);
+  const pid_t pid = bench.status().pid;
+  bench.supervisor.heartbeat("a", pid, now);
+
+  // Pauses of 0.5 to 60 s; HEALTH comes a second after each, as from a process that goes on.
+  for (int i = 0; i < 50; ++i) {
+    now += launch::milliseconds(std::uniform_int_distribution<int>(500, 60'000)(random));
+    for (int step = 0; step < 10; ++step) {
+      bench.supervisor.step(now);
+      REQUIRE(bench.status().state == launch::ProcessState::kRunning);
+      now += launch::milliseconds(100);
+    }
+    bench.supervisor.heartbeat("a", pid, now);
+    bench.supervisor.step(now);
+  }
+  CHECK(bench.status().restarts == 0);
+  CHECK_THAT(bench.said, Contains("launch: did not run for"));
+
+  // One that is silent beyond the pause hangs all the same.
+  now += launch::milliseconds(60'000);
+  for (int step = 0; step < 45; ++step) bench.supervisor.step(now += launch::milliseconds(100));
+  CHECK(bench.status().state == launch::ProcessState::kDegraded);
+  for (int step = 0; step < 15; ++step) bench.supervisor.step(now += launch::milliseconds(100));
+  CHECK_THAT(bench.said, Contains("a: hangs: no HEALTH for 5."));
+}
+
+TEST_CASE("a pause of the supervisor is no time in which a process was stopped", "[launch]") {
+  Bench bench({shell("a", "exec sleep 1000")});
+  auto now = launch::Clock::now();
+  bench.supervisor.start({}, now);
+  const pid_t pid = bench.status().pid;
+  ::kill(pid, SIGSTOP);
+  REQUIRE(bench.run_until([&] { return bench.status().state == launch::ProcessState::kDegraded; }));
+
+  // Both are frozen for a minute, then go on.
+  now = launch::Clock::now() + std::chrono::seconds(60);
+  bench.supervisor.step(now);
+  ::kill(pid, SIGCONT);
+  ::poll(nullptr, 0, 100);
+  bench.supervisor.step(now + launch::milliseconds(100));
+  CHECK(bench.status().state == launch::ProcessState::kRunning);
+  CHECK(bench.status().pid == pid);
 }
 
 TEST_CASE("a refused configuration is not tried again", "[launch]") {
@@ -101,6 +190,25 @@ TEST_CASE("a refused configuration is not tried again", "[launch]") {
   REQUIRE(bench.run_until([&] { return bench.supervisor.stopped(); }));
   CHECK(bench.status().restarts == 0);
   CHECK(bench.supervisor.refused() == std::vector<std::string>{"a"});
+}
+
+TEST_CASE("a configuration that is refused in a drive is looked at again at a slow pace",
+          "[launch]") {
+  launch::SupervisorParameters parameters;
+  parameters.restart.slow_retry = launch::milliseconds(200);
+  const TemporaryDirectory directory;
+  const std::string file = directory / "configuration";
+  std::ofstream(file) << "fine";
+  Bench bench({shell("a", "test -e " + file + " || exit 2; exec sleep 1000")}, parameters);
+  bench.supervisor.start({}, launch::Clock::now());
+  ::poll(nullptr, 0, 100);  // It has read its configuration.
+  std::filesystem::remove(file);
+  ::kill(bench.status().pid, SIGKILL);
+  REQUIRE(bench.run_until([&] { return bench.status().is_given_up; }));
+  CHECK(bench.supervisor.refused().empty());
+
+  std::ofstream(file) << "fine";
+  REQUIRE(bench.run_until([&] { return bench.status().state == launch::ProcessState::kRunning; }));
 }
 
 TEST_CASE("an executable that is not there is named", "[launch]") {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 
 #include "tests/catch.hpp"
 #include "tests/io/log_fixture.hpp"
@@ -168,4 +169,35 @@ TEST_CASE_METHOD(Fixture, "random damage never invents sizes or fails", "[log]")
     REQUIRE(read_bytes + result.damage.bytes == damaged.size());
     REQUIRE(result.events.size() + static_cast<std::size_t>(2 * hits) >= events.size());
   }
+}
+
+TEST_CASE_METHOD(Fixture, "holes of a file cost no time, and what is behind them is found",
+                 "[log]") {
+  constexpr std::uintmax_t kGiB = std::uintmax_t{1} << 30U;
+  const auto file = directory / "sparse.lcm";
+  const auto start = std::chrono::steady_clock::now();
+  for (const std::uintmax_t hole : {std::uintmax_t{1}, kGiB - 1, 100 * kGiB + 5}) {
+    // The log, the hole, the log again; numbers begin anew.
+    write_bytes(file, bytes);
+    std::filesystem::resize_file(file, bytes.size() + hole);
+    std::ofstream(file, std::ios::binary | std::ios::app)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+    LcmLogReader reader(file);
+    const auto read = test::read_log(reader);
+    CAPTURE(hole);
+    // The event in front of a hole is not beyond doubt.
+    CHECK(read.size() + 1 >= 2 * events.size());
+    CHECK(strangers(read, events) == 0);
+    CHECK(reader.damage().places == 1);
+    CHECK(reader.damage().bytes >= hole);
+  }
+
+  // Nothing but a hole is another kind of file.
+  write_bytes(file, {});
+  std::filesystem::resize_file(file, 1000 * kGiB);
+  LcmLogReader reader(file);
+  CHECK_FALSE(reader.next());
+  CHECK_THROWS_WITH(reader.refuse_other_files(), Catch::Matchers::Contains("no LCM log"));
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(20));
 }

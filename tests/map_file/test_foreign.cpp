@@ -128,3 +128,54 @@ TEST_CASE_METHOD(Opened, "a file that may not be written is read, and not change
   std::filesystem::permissions(directory.path(), perms(0700));
   CHECK(same(MapFile(file, Access::kRead).read(1), map));
 }
+
+TEST_CASE_METHOD(Opened, "what a killed writer left on a disk that cannot be written is named",
+                 "[map_file]") {
+  // As the writer's death leaves them: the file, and the log with its last change.
+  const TemporaryDirectory elsewhere;
+  const std::filesystem::path copy = elsewhere / "copied.gpkg";
+  const std::filesystem::path log = copy.string() + "-wal";
+  {
+    MapFile writing(file, Access::kWrite);
+    writing.put({&map, 1}, note("put"));
+    std::filesystem::copy_file(file, copy);
+    std::filesystem::copy_file(file.string() + "-wal", log);
+  }
+
+  const auto said_to_nobody = [&] {
+    int ends[2];
+    REQUIRE(::pipe(ends) == 0);
+    in_child([&] {
+      constexpr uid_t kNobody = 65534;
+      if (::geteuid() == 0 && ::setuid(kNobody) != 0) return 254;
+      std::string said = "opened";
+      try {
+        MapFile(copy, Access::kRead).check();
+      } catch (const MapFileError& error) {
+        said = error.what();
+      }
+      return ::write(ends[1], said.data(), said.size()) > 0 ? 0 : 1;
+    });
+    ::close(ends[1]);
+    std::string said(4096, ' ');
+    said.resize(static_cast<std::size_t>(std::max<ssize_t>(::read(ends[0], said.data(), 4096), 0)));
+    ::close(ends[0]);
+    return said;
+  };
+
+  using std::filesystem::perms;
+  std::filesystem::permissions(copy, perms(0444));
+  std::filesystem::permissions(log, perms(0444));
+  std::filesystem::permissions(elsewhere.path(), perms(0555));
+  const std::string said = said_to_nobody();
+  CHECK_THAT(said, Contains(copy.string()) && Contains("copied.gpkg-wal") &&
+                       Contains("Permission denied") && Contains("copy both files"));
+
+  // Nothing is wrong with them: where they can be written, all of it is there.
+  std::filesystem::permissions(elsewhere.path(), perms(0700));
+  std::filesystem::permissions(copy, perms(0600));
+  std::filesystem::permissions(log, perms(0600));
+  const MapFile brought_in(copy, Access::kRead);
+  CHECK(brought_in.check().empty());
+  CHECK(brought_in.history().size() == 2);
+}

@@ -242,6 +242,39 @@ TEST_CASE("connections above the limit are closed at once", "[web]") {
       [&] { return test::get(server.port(), "/").find("page") != std::string::npos; }));
 }
 
+TEST_CASE("requests that drip in do not keep others out", "[web]") {
+  web::ServerOptions few = options();
+  few.most_connections = 8;
+  few.request_timeout_s = 30;
+  web::Server server(few);
+  server.set_document("/", {"text/html", "page"});
+  std::vector<std::unique_ptr<test::RawClient>> slow;
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < 50; ++i) {
+    slow.push_back(std::make_unique<test::RawClient>(server.port()));
+    for (const auto& one : slow) one->send("G");
+    if (i % 10 != 9) continue;
+    CHECK_THAT(test::get(server.port(), "/"), Contains("page"));
+  }
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(10));
+  CHECK(server.counts().gave_way >= 40);
+  CHECK(server.counts().too_many == 0);
+
+  // A WebSocket keeps its place.
+  test::SocketClient client(server.port(), "/live");
+  for (int i = 0; i < 20; ++i) {
+    slow.push_back(std::make_unique<test::RawClient>(server.port()));
+    slow.back()->send("G");
+  }
+  client.send("still here");
+  CHECK(test::holds_soon([&] {
+    for (const Event& event : server.take_events()) {
+      if (event.kind == Event::Kind::kText) return event.data == "still here";
+    }
+    return false;
+  }));
+}
+
 TEST_CASE("random bytes on many connections leave the server alive", "[web]") {
   web::Server server(options());
   server.set_document("/", {"text/html", "page"});

@@ -37,6 +37,8 @@ class SmoothingMapper final : public MapperMethod {
     current_.start_with(landmarks);
   }
 
+  void begin_with_number(std::uint32_t map_id) override { current_ = OneMap(parameters_, map_id); }
+
   std::vector<model::KeyframePose> trajectory() const override {
     return units_.metres(current_.told_poses());
   }
