@@ -31,6 +31,8 @@ std::string_view to_string(DatagramFault fault) {
       return "datagram_no_room";
     case DatagramFault::kIncomplete:
       return "datagram_incomplete";
+    case DatagramFault::kFromOutside:
+      return "datagram_from_outside";
   }
 
   return "datagram_unknown";

@@ -22,14 +22,17 @@ enum class DatagramFault : std::uint8_t {
   kOverlapping,    ///< Bytes that another fragment has brought.
   kNoRoom,         ///< Reassembly is full: dropped by the rules of UdpmReassembler.
   kIncomplete,     ///< Fragments of a message that did not come in time; counted once a message.
+  kFromOutside,    ///< From another computer, on a bus of TTL 0.
 };
-inline constexpr std::size_t kDatagramFaults = 12;
+inline constexpr std::size_t kDatagramFaults = 13;
 
 /// Name of the fault as HEALTH shows it, lower_snake with `datagram_` in front.
 std::string_view to_string(DatagramFault fault);
 
-/// False for what costs nothing and is only counted: a repetition.
-constexpr bool is_harmful(DatagramFault fault) { return fault != DatagramFault::kRepeated; }
+/// False for what costs nothing and is only counted: a repetition, and what others say.
+constexpr bool is_harmful(DatagramFault fault) {
+  return fault != DatagramFault::kRepeated && fault != DatagramFault::kFromOutside;
+}
 
 /// Counts by fault; a plain value.
 class DatagramFaults {

@@ -52,6 +52,16 @@ std::string complete_lcm_url(const std::string& url) {
   return result;
 }
 
+void require_closed_bus(const std::string& url) {
+  const std::string complete = complete_lcm_url(url);
+  if (!is_udpm_url(complete) || parse_udpm_url(complete).ttl == 0) return;
+  throw BusError(
+      complete +
+      ": with a TTL above 0 every computer of the network hears this bus and can send to "
+      "it, a map or a pose among others. --open-bus if this network is the vehicle's "
+      "own; else ttl=0");
+}
+
 std::int64_t granted_receive_buffer(std::int64_t wanted_bytes) {
   const int socket_fd = ::socket(AF_INET, SOCK_DGRAM, 0);
   if (socket_fd < 0) return 0;

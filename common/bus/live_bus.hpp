@@ -21,6 +21,10 @@ inline constexpr double kBulkBytesPerSecond = 60e6;
 /// accident.
 std::string complete_lcm_url(const std::string& url);
 
+/// Throws BusError where the completed URL lets other computers hear the bus, and send to it: LCM
+/// knows no sender from another.
+void require_closed_bus(const std::string& url);
+
 /// What the kernel grants a socket that asks for `wanted_bytes`.
 std::int64_t granted_receive_buffer(std::int64_t wanted_bytes);
 

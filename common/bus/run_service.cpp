@@ -28,6 +28,7 @@ struct Options {
   std::string lcm_url;
   std::string state_dir;
   std::string channel_suffix;
+  bool is_open_bus = false;
   bool prints_config = false;
 };
 
@@ -173,8 +174,9 @@ int serve(const Service& service, const Options& options) {
   // The bus, the service on it, and its state.
   StopSignal stop;
   const Clock clock = system_clock();
-  const std::unique_ptr<Bus> bus =
-      make_live_bus(options.lcm_url.empty() ? runtime.lcm_url : options.lcm_url);
+  const std::string url = options.lcm_url.empty() ? runtime.lcm_url : options.lcm_url;
+  if (!options.is_open_bus) require_closed_bus(url);
+  const std::unique_ptr<Bus> bus = make_live_bus(url);
   auto hosted = make_hosted(service, *bus, clock, toml, options);
   const auto store = recover_state(hosted, service, *bus, clock, toml, options);
   report_small_buffer(hosted->node(), bus->receive_buffer());
@@ -210,6 +212,9 @@ int run_service(const Service& service, int argc, char** argv) {
   app.add_option("--state-dir", options.state_dir, "Keep the state here, to go on after a restart");
   app.add_option("--channel-suffix", options.channel_suffix, "Appended to every output channel");
 
+  app.add_flag("--open-bus", options.is_open_bus,
+               "Allow a TTL above 0: other computers hear the bus and can send to it")
+      ->envname("UNDERSTORY_OPEN_BUS");
   app.add_flag("--print-config", options.prints_config, "Print the configuration file in force");
   app.set_version_flag("--version", program_version());
   try {

@@ -70,7 +70,7 @@ std::int64_t UdpmReceiver::join(const UdpmUrl& network, const std::string& url) 
   const std::int64_t granted_bytes = socket->granted_bytes();
   {
     const std::lock_guard lock(mutex_);
-    joined_.push_back({std::move(socket)});
+    joined_.push_back({std::move(socket), network.ttl > 0});
   }
   ::eventfd_write(wake_, 1);
   return granted_bytes;
@@ -136,13 +136,17 @@ void UdpmReceiver::take_batch() {
   }
   const std::int64_t now_us = steady_us();
   while (Group* const group = earliest()) {
-    take(group->waiting.front(), now_us);
+    take(*group, now_us);
     group->waiting = group->waiting.subspan(1);
     if (group->waiting.empty()) return;
   }
 }
 
-void UdpmReceiver::take(const ReceivedDatagram& datagram, std::int64_t now_us) {
+/// The first that waits.
+void UdpmReceiver::take(const Group& group, std::int64_t now_us) {
+  const ReceivedDatagram& datagram = group.waiting.front();
+  if (!group.is_open && !own_addresses_.contains(datagram.sender.address, now_us))
+    return own_faults_.add(DatagramFault::kFromOutside);
   try {
     const auto taken = reassembler_.take(datagram.bytes, datagram.sender, now_us);
     if (taken.fault) note_faults();  // before what comes behind it is handed out
@@ -150,13 +154,13 @@ void UdpmReceiver::take(const ReceivedDatagram& datagram, std::int64_t now_us) {
       sink_(taken.message->channel, taken.message->bytes, datagram.received_ns / 1000);
     }
   } catch (const std::bad_alloc&) {
-    out_of_memory_.add(DatagramFault::kNoRoom);
+    own_faults_.add(DatagramFault::kNoRoom);
   }
 }
 
 void UdpmReceiver::note_faults() {
   DatagramFaults faults = reassembler_.faults();
-  faults.add(out_of_memory_);
+  faults.add(own_faults_);
   const std::lock_guard lock(mutex_);
   faults_ = faults;
 }

@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "common/bus/own_addresses.hpp"
 #include "common/bus/udpm_socket.hpp"
 
 namespace understory::bus {
@@ -30,7 +31,8 @@ class UdpmReceiver {
   UdpmReceiver(const UdpmReceiver&) = delete;
   UdpmReceiver& operator=(const UdpmReceiver&) = delete;
 
-  /// Joins one more group; `url` is for messages. Returns the receive buffer that the kernel grants
+  /// Joins one more group; `url` is for messages. Of a TTL of 0 what comes from other computers is
+  /// refused. Returns the receive buffer that the kernel grants
   /// [bytes]. Throws BusError.
   std::int64_t join(const UdpmUrl& network, const std::string& url);
   /// What was refused so far: all that came before the message given last.
@@ -40,6 +42,7 @@ class UdpmReceiver {
   /// A socket, and what was read from it and not handled yet.
   struct Group {
     std::unique_ptr<UdpmSocket> socket;
+    bool is_open = false;  ///< To other computers.
     std::span<const ReceivedDatagram> waiting = {};
   };
 
@@ -48,13 +51,14 @@ class UdpmReceiver {
   bool read_sockets();
   Group* earliest();
   void take_batch();
-  void take(const ReceivedDatagram& datagram, std::int64_t now_us);
+  void take(const Group& group, std::int64_t now_us);
   void note_faults();
 
   Sink sink_;
-  std::vector<Group> groups_;     // the thread's alone
-  UdpmReassembler reassembler_;   // the thread's alone
-  DatagramFaults out_of_memory_;  // the thread's alone
+  std::vector<Group> groups_;    // the thread's alone
+  UdpmReassembler reassembler_;  // the thread's alone
+  OwnAddresses own_addresses_;   // the thread's alone
+  DatagramFaults own_faults_;    // the thread's alone: not the reassembler's
   mutable std::mutex mutex_;
   std::vector<Group> joined_;  // guarded by mutex_: the thread takes them
   bool ends_ = false;          // guarded by mutex_

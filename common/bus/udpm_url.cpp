@@ -61,6 +61,8 @@ UdpmUrl parse_udpm_url(const std::string& url) {
   }
 
   if (question == std::string_view::npos) return result;
+  const std::string_view ttl = value_of(rest.substr(question + 1), "ttl");
+  if (!ttl.empty()) result.ttl = number_in_url<std::uint8_t>(ttl, "TTL from 0 to 255", url);
   const std::string_view size = value_of(rest.substr(question + 1), "recv_buf_size");
   if (!size.empty()) {
     result.receive_buffer_bytes =

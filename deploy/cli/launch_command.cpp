@@ -39,6 +39,7 @@ struct LaunchOptions {
   std::vector<std::string> only;
   bool fresh = false;
   bool quiet = false;
+  bool is_open_bus = false;
   GivenMapOptions map;
 };
 
@@ -109,6 +110,7 @@ std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options,
     if (!options.lcm_url.empty()) {
       spec.command.environment.push_back("LCM_DEFAULT_URL=" + options.lcm_url);
     }
+    if (options.is_open_bus) spec.command.environment.emplace_back("UNDERSTORY_OPEN_BUS=1");
 
     specs.push_back(std::move(spec));
   }
@@ -248,6 +250,7 @@ void launch_processes(const LaunchOptions& options) {
     wrong_usage(error.what());
   }
 
+  if (!options.is_open_bus) bus::require_closed_bus(options.lcm_url);
   const std::optional<GivenMapLayers> layer = map_layer(options, entries);
   const StopSignals signals;
   launch::Registry registry(options.state);
@@ -294,6 +297,8 @@ void add_launch_command(CLI::App& parent) {
   add_given_map_options(*command, options->map);
   command->add_flag("--fresh", options->fresh,
                     "Forget the state of earlier runs first; maps of drives stay");
+  command->add_flag("--open-bus", options->is_open_bus,
+                    "Allow a TTL above 0: other computers hear the bus and can send to it");
   command->add_flag("--quiet", options->quiet, "Print nothing but errors");
   command->callback([options] { launch_processes(*options); });
 }

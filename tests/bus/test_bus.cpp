@@ -149,6 +149,17 @@ TEST_CASE("the URL is completed so that nothing is lost or leaves by accident") 
   CHECK_THROWS_AS(LiveBus("nonsense://x"), BusError);
 }
 
+TEST_CASE("a bus that the network can hear is refused by name") {
+  CHECK_NOTHROW(require_closed_bus("udpm://239.1.1.1:7000"));
+  CHECK_NOTHROW(require_closed_bus("udpm://239.1.1.1:7000?ttl=0"));
+  CHECK_NOTHROW(require_closed_bus("memq://"));
+  for (const char* url :
+       {"udpm://239.1.1.1:7000?ttl=1", "udpm://239.1.1.1:7000?recv_buf_size=9&ttl=255"})
+    CHECK_THROWS_WITH(require_closed_bus(url),
+                      Catch::Matchers::Contains(url) && Catch::Matchers::Contains("--open-bus"));
+  CHECK_THROWS_AS(require_closed_bus("udpm://239.1.1.1:7000?ttl=256"), BusError);
+}
+
 TEST_CASE("faults are counted, seeded, and together make up all messages") {
   const auto run = [](std::uint64_t seed) {
     MemoryBus inner(MemoryBus::Queues::kUnlimited);

@@ -159,6 +159,7 @@ void attack(std::uint64_t seed, std::uint64_t datagrams) {
   CHECK(sum > 0);
   for (std::size_t i = 0; i < kDatagramFaults; ++i) {
     INFO(to_string(static_cast<DatagramFault>(i)));
+    if (static_cast<DatagramFault>(i) == DatagramFault::kFromOutside) continue;  // The receiver's.
     CHECK(reassembler.faults().count_of(static_cast<DatagramFault>(i)) > 0);
   }
 }

@@ -15,6 +15,7 @@
 #include "common/bus/bulk_group.hpp"
 #include "common/bus/live_bus.hpp"
 #include "common/bus/node.hpp"
+#include "common/bus/own_addresses.hpp"
 #include "common/bus/port_owner.hpp"
 #include "common/bus/process_memory.hpp"
 #include "common/bus/udpm_reassembly.hpp"
@@ -218,6 +219,15 @@ TEST_CASE("after a pause messages of both groups come in the order in which they
   }
   sink.go_on();
   CHECK(sink.wait_for(sent.size()) == sent);
+}
+
+TEST_CASE("the computer's own addresses are known, those of others are not") {
+  OwnAddresses own;
+  CHECK(own.contains(0x7F000001, 0));
+  CHECK(own.contains(0x7F010203, 0));
+  CHECK_FALSE(own.contains(0xC0000201, 0));  // 192.0.2.1: for examples only
+  CHECK_FALSE(own.contains(0xC0000201, 5'000'000));
+  CHECK_FALSE(is_harmful(DatagramFault::kFromOutside));
 }
 
 TEST_CASE("the descriptor is readable while a message waits, and only then") {
