@@ -17,6 +17,7 @@ import render_existence  # noqa: E402
 import render_gaps  # noqa: E402
 import render_partition  # noqa: E402
 import render_places  # noqa: E402
+import render_reliability  # noqa: E402
 import render_returns  # noqa: E402
 from experiments import EXPERIMENTS, printed  # noqa: E402
 
@@ -91,6 +92,8 @@ SECTIONS = (
     ("laps", "Known ground: what must not grow", None, render.laps),
     ("laps-held", "Localisation only: what must not change", None, render.laps),
     ("health", "What HEALTH says of wrong poses", None, render.health),
+    ("reliability-load-0", "Real processes while messages and processes are late", None, render_reliability.reliability),
+    ("reliability-load-8", "The same on a busy computer", None, render_reliability.reliability),
     ("gaps", "Processes that hang, sensors that are silent", None, render_gaps.gaps),
     ("misstated", "Sensors that are not as stated", None, render.misstated),
     ("victoria-park", "A real drive: Victoria Park", "stated figures of the batch solution", render.victoria_park),

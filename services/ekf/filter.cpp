@@ -103,9 +103,10 @@ void Filter::add(const model::Odometry& increment) {
 }
 
 EkfOutput Filter::go_ahead() {
+  const bool is_stationary_last = queue_.newest().is_stationary;
   advance(*queue_.overdue());
   EkfOutput output = report_.pose(state_, motion_, timeline_.now(), {});
-  if (queue_.next()->is_stationary)
+  if (queue_.next() ? queue_.next()->is_stationary : is_stationary_last)
     output.correction = report_.all(state_, motion_, timeline_.now(), {}).correction;
   return output;
 }

@@ -27,6 +27,8 @@ class OdometryQueue {
   void push(const model::Odometry& increment);
   /// Takes out the oldest increment if it ends by `utime` (tolerance 1 ms).
   std::optional<model::Odometry> take_ended_by(model::Utime utime);
+  /// Precondition: an increment waits.
+  const model::Odometry& newest() const { return increments_.back(); }
   /// Forgets all increments.
   void clear() { increments_.clear(); }
 

@@ -120,3 +120,20 @@ TEST_CASE("A scan that is too late is refused, and the filter goes on", "[ekf]")
   }
   CHECK(filter.counters().scans_refused == 1);
 }
+
+TEST_CASE("Without any wait for scans each increment gives a pose, and scans are used", "[ekf]") {
+  EkfParameters parameters = white_noise();
+  parameters.max_scan_delay_s = 0.0;
+  sim::InertialDrive drive(short_drive(), trunks(), 9);
+  Ekf filter(parameters);
+  for (int k = 0; k < 60; ++k) {
+    const sim::DriveStep step = drive.next();
+    for (const model::Odometry& increment : step.odometry) {
+      const EkfOutput output = filter.add(increment);
+      if (filter.utime() > 0) CHECK(output.pose);
+    }
+    filter.add(true_tracks(step));
+  }
+  CHECK(filter.counters().landmarks_used > 100);
+  CHECK(filter.counters().scans_refused == 0);
+}
