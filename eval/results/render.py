@@ -149,9 +149,9 @@ def noise_shared(document):
         if (sigma, rate) in shared:
             smoothing = by["smoothing"]
             lines.append((f"{sigma:g} cm, {rate:g} %", errors, pair(by["baseline"]), f"**{pair(smoothing)}**", pair(by["oracle"]),
-                          number(smoothing["ratio"], 3), number(smoothing["ratio_lpe"], 3), number(smoothing["ate_cm"]),
-                          f"{smoothing['runs_with_new_maps']} of {smoothing['runs']}"))
-    head = ("noise, detection", "errors of detections", "baseline", "**smoothing**", "oracle", "RPE ratio", "LPE ratio",
+                          number(smoothing["ratio"], 3), number(smoothing["ratio_lpe"], 3),
+                          f"{number(smoothing['updates'], 1)} of {smoothing['updates_possible']}", number(smoothing["ate_cm"]), f"{smoothing['runs_with_new_maps']} of {smoothing['runs']}"))
+    head = ("noise, detection", "errors of detections", "baseline", "**smoothing**", "oracle", "RPE ratio", "LPE ratio", "updates",
             "ATE of the last map cm", "runs that lost their map")
     return table(head, lines) + [""] if lines else []
 
