@@ -73,6 +73,11 @@ SharedErrorParameters measured_shared_errors() {
   return measured;
 }
 
+double measured_sigma_m() {
+  const SharedErrorParameters measured = measured_shared_errors();
+  return std::hypot(kMeasuredIndependentSigmaM, measured.along_sigma_m, measured.direction_sigma_m);
+}
+
 SharedErrors::SharedErrors(const SharedErrorParameters& parameters, std::uint64_t forest_seed,
                            std::uint64_t drive_seed)
     : parameters_(parameters),

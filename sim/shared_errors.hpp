@@ -48,6 +48,8 @@ struct SharedErrorParameters {
 SharedErrorParameters measured_shared_errors();
 /// The independent standard deviation per axis that belongs to them [m].
 inline constexpr double kMeasuredIndependentSigmaM = 0.01;
+/// Standard deviation per axis of both together, without the bias of ranges [m]: 0.054.
+double measured_sigma_m();
 
 /// The errors of one drive. Every value follows from the seeds and the arguments alone, whatever
 /// was asked before. Asking costs about 5 us where the path's part is on.

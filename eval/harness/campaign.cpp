@@ -12,6 +12,9 @@
 namespace understory::eval::harness {
 namespace {
 
+/// Of the standard deviation that kSharedWide states.
+constexpr double kWide = 3.0;
+
 bool wanted(const CampaignOptions& options, const std::string& method) {
   return std::find(options.methods.begin(), options.methods.end(), method) != options.methods.end();
 }
@@ -49,7 +52,35 @@ std::map<std::string, RunResult> run_all_methods(const Cell& cell, const Campaig
   return results;
 }
 
+/// The power of the independent noise goes to what is measured to be shared.
+void share_errors(sim::SensorParameters& sensor) {
+  const double scale = sensor.position_sigma_m / sim::measured_sigma_m();
+  sensor.shared = sim::measured_shared_errors();
+  sensor.shared.along_sigma_m *= scale;
+  sensor.shared.direction_sigma_m *= scale;
+  sensor.position_sigma_m = scale * sim::kMeasuredIndependentSigmaM;
+  sensor.stated_factor = sim::measured_sigma_m() / sim::kMeasuredIndependentSigmaM;
+}
+
 }  // namespace
+
+const char* to_string(Errors errors) {
+  switch (errors) {
+    case Errors::kShared:
+      return "shared";
+    case Errors::kSharedWide:
+      return "shared-wide";
+    case Errors::kIndependent:
+      break;
+  }
+  return "independent";
+}
+
+Errors errors_named(std::string_view name) {
+  for (const Errors one : {Errors::kIndependent, Errors::kShared, Errors::kSharedWide})
+    if (name == to_string(one)) return one;
+  throw std::invalid_argument(fmt::format("unknown errors '{}'", name));
+}
 
 sim::DriveParameters Cell::drive() const {
   sim::DriveParameters parameters;
@@ -58,13 +89,15 @@ sim::DriveParameters Cell::drive() const {
   parameters.path.interval = interval_m;
   parameters.sensor.position_sigma_m = sigma_m;
   parameters.sensor.detection_probability = detection;
+  if (errors != Errors::kIndependent) share_errors(parameters.sensor);
+  if (errors == Errors::kSharedWide) parameters.sensor.stated_factor *= kWide;
   return parameters;
 }
 
 std::string Cell::name() const {
-  return fmt::format("{}-{}-{:.0f}cm-{:.0f}-every{:.0f}cm", sim::to_string(path),
-                     sim::to_string(forest), 100.0 * sigma_m, 100.0 * detection,
-                     100.0 * interval_m);
+  return fmt::format("{}-{}-{:.0f}cm-{:.0f}-every{:.0f}cm{}", sim::to_string(path),
+                     sim::to_string(forest), 100.0 * sigma_m, 100.0 * detection, 100.0 * interval_m,
+                     errors == Errors::kIndependent ? "" : fmt::format("-{}", to_string(errors)));
 }
 
 std::vector<CellResult> run_campaign(const std::vector<Cell>& cells, const CampaignOptions& options,

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "eval/harness/published_tables.hpp"
@@ -25,6 +26,22 @@ struct CampaignOptions {
   bool plots = true;
 };
 
+/// Errors of detected positions.
+enum class Errors : std::uint8_t {
+  kIndependent,  ///< White noise.
+  /// Correlated along the path and by the direction of view in the proportions measured on a
+  /// recorded walk (sim::measured_shared_errors()), of the same power, and all of that stated; the
+  /// bias of ranges as measured.
+  kShared,
+  /// The same, stated with three times the standard deviation: what the mean of a keyframe's scans
+  /// keeps of such errors, stated as if each scan had errors of its own.
+  kSharedWide,
+};
+/// "independent", "shared", "shared-wide".
+const char* to_string(Errors errors);
+/// Of such a name. Throws std::invalid_argument for another one.
+Errors errors_named(std::string_view name);
+
 /// One setting of the simulation.
 struct Cell {
   sim::ForestKind forest = sim::ForestKind::kIntermediate;
@@ -32,6 +49,7 @@ struct Cell {
   double sigma_m = 0.2;     ///< Standard deviation of a detected position, per axis.
   double detection = 0.9;   ///< Probability that a trunk in range is detected.
   double interval_m = 0.2;  ///< Between two scans.
+  Errors errors = Errors::kIndependent;
   std::optional<PublishedFigures> published;
 
   /// The parameters of the simulated drive.

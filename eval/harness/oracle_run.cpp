@@ -39,7 +39,8 @@ RunResult run(const RecordedDrive& recorded, std::span<const std::size_t> scans_
   RunResult result;
   metrics::BatchOracle oracle;
   std::optional<metrics::MapTruth> truth;
-  const double sigma_m = recorded.drive.parameters().sensor.position_sigma_m;
+  const sim::SensorParameters& sensor = recorded.drive.parameters().sensor;
+  const double sigma_m = sensor.stated_factor * sensor.position_sigma_m;
 
   for (std::size_t i = 0; i < scans_of_state.size(); ++i) {
     while (oracle.scans() < scans_of_state[i]) {

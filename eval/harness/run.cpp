@@ -67,7 +67,10 @@ class Scorer {
       state.landmarks_m.push_back(landmark.position_m);
 
     if (state.poses.empty()) return;
-    if (!truth_) truth_.emplace(recorded_.drive, state.poses.front().scan);
+    const std::size_t first_base = state.poses.front().scan;
+    if (first_base_.value_or(first_base) != first_base) ++result_.score.new_maps;
+    first_base_ = first_base;
+    if (!truth_) truth_.emplace(recorded_.drive, first_base);
 
     for (const metrics::PoseEstimate& pose : state.poses) {
       if (accepted_.insert(pose.scan).second && error_m(pose) > kWrongPose_m) {
@@ -123,6 +126,7 @@ class Scorer {
   const RecordedDrive& recorded_;
   SlamSession session_;
   std::optional<metrics::MapTruth> truth_;
+  std::optional<std::size_t> first_base_;  ///< Of the map in force.
   std::map<std::uint64_t, std::size_t> base_of_keyframe_;
   std::set<std::size_t> accepted_;  ///< Bases whose first estimate was judged.
   std::vector<model::MapLandmark> landmarks_;

@@ -59,6 +59,7 @@ struct RunScore {
   int updates = 0;             ///< Keyframes that are in the map at the end.
   int updates_possible = 0;    ///< Scans / 8.
   int wrong_updates = 0;       ///< Accepted with a position error beyond 1 m.
+  int new_maps = 0;            ///< Begun because the one before was lost.
   int keyframes_withheld = 0;  ///< By the keyframer or the mapper.
   metrics::MapCompleteness completeness;
   double ate_m = 0.0;

@@ -63,6 +63,7 @@ Summary summary_of(const Cell& cell, const std::string& method,
     summary.updates += score.updates / static_cast<double>(runs.size());
     summary.updates_possible = score.updates_possible;
     summary.wrong_updates += score.wrong_updates;
+    summary.runs_with_new_maps += score.new_maps > 0 ? 1 : 0;
 
     total.well_seen += score.completeness.well_seen;
     total.recalled += score.completeness.recalled;
@@ -132,6 +133,7 @@ nlohmann::json to_json(const Summary& row) {
                       {"sigma_cm", rounded(100.0 * row.cell.sigma_m)},
                       {"detection_pct", rounded(100.0 * row.cell.detection)},
                       {"interval_cm", rounded(100.0 * row.cell.interval_m)},
+                      {"errors", to_string(row.cell.errors)},
                       {"runs", row.runs},
                       {"rpe_cm", row.rpe_cm.mean},
                       {"rpe_cm_sd", row.rpe_cm.standard_deviation},
@@ -144,6 +146,7 @@ nlohmann::json to_json(const Summary& row) {
                       {"updates", row.updates},
                       {"updates_possible", row.updates_possible},
                       {"wrong_updates", row.wrong_updates},
+                      {"runs_with_new_maps", row.runs_with_new_maps},
                       {"map_recall_pct", row.map_recall_pct},
                       {"false_landmarks_pct", row.false_landmarks_pct},
                       {"landmarks_in_range", row.landmarks_in_range}};
@@ -156,7 +159,7 @@ nlohmann::json to_json(const Summary& row) {
   json["ratio"] = or_null(row.ratio);
   json["ratio_lpe"] = or_null(row.ratio_lpe);
   json["nees"] = or_null(row.nees);
-  if (!row.has_ideal_scans) json["sigma_cm"] = json["detection_pct"] = nullptr;
+  if (!row.has_ideal_scans) json["sigma_cm"] = json["detection_pct"] = json["errors"] = nullptr;
   if (!row.has_map) {
     for (const char* key :
          {"lpe_cm", "lpe_cm_sd", "lpe_cm_runs", "map_recall_pct", "false_landmarks_pct",
@@ -176,10 +179,11 @@ nlohmann::json to_json(const Summary& row) {
 
 std::string to_table(const std::vector<Summary>& rows) {
   std::string table = fmt::format(
-      "{:<14} {:<12} {:>5} {:>4} {:>4}  {:<9} {:>8} {:>6} {:>8} {:>6} {:>6} {:>11} {:>5} {:>7} "
-      "{:>6} {:>7} {:>5} | {:>7} {:>7} {:>6}\n",
-      "path", "forest", "noise", "det", "step", "method", "RPE cm", "+-sd", "LPE cm", "ratio",
-      "r.LPE", "updates", "wrong", "recall", "false", "ATE cm", "NEES", "RPE", "LPE", "upd.");
+      "{:<14} {:<12} {:>5} {:>4} {:>4} {:<11} {:<9} {:>8} {:>6} {:>8} {:>6} {:>6} {:>11} {:>5} "
+      "{:>7} {:>6} {:>7} {:>5} | {:>7} {:>7} {:>6}\n",
+      "path", "forest", "noise", "det", "step", "errors", "method", "RPE cm", "+-sd", "LPE cm",
+      "ratio", "r.LPE", "updates", "wrong", "recall", "false", "ATE cm", "NEES", "RPE", "LPE",
+      "upd.");
 
   for (const Summary& row : rows) {
     const auto number = [](double value, const char* format) {
@@ -190,14 +194,14 @@ std::string to_table(const std::vector<Summary>& rows) {
     };
 
     table += fmt::format(
-        "{:<14} {:<12} {:>5} {:>4} {:>2.0f}cm  {:<9} {:>8.2f} {:>6.2f} {:>8} {:>6} {:>6} "
+        "{:<14} {:<12} {:>5} {:>4} {:>2.0f}cm {:<11} {:<9} {:>8.2f} {:>6.2f} {:>8} {:>6} {:>6} "
         "{:>11} {:>5} {:>7} {:>6} {:>7.2f} {:>5} |",
         sim::to_string(row.cell.path), sim::to_string(row.cell.forest),
         if_any(row.has_ideal_scans, 100.0 * row.cell.sigma_m, "{:.0f}cm"),
         if_any(row.has_ideal_scans, 100.0 * row.cell.detection, "{:.0f}%"),
-        100.0 * row.cell.interval_m, row.method, row.rpe_cm.mean, row.rpe_cm.standard_deviation,
-        if_any(row.has_map, row.lpe_cm.mean, "{:.2f}"), number(row.ratio, "{:.3f}"),
-        number(row.ratio_lpe, "{:.3f}"),
+        100.0 * row.cell.interval_m, to_string(row.cell.errors), row.method, row.rpe_cm.mean,
+        row.rpe_cm.standard_deviation, if_any(row.has_map, row.lpe_cm.mean, "{:.2f}"),
+        number(row.ratio, "{:.3f}"), number(row.ratio_lpe, "{:.3f}"),
         row.has_map ? fmt::format("{:>7.1f}/{:<3}", row.updates, row.updates_possible) : "-",
         row.wrong_updates, if_any(row.has_map, row.map_recall_pct, "{:.1f}%"),
         if_any(row.has_map, row.false_landmarks_pct, "{:.2f}%"), row.ate_cm.mean,

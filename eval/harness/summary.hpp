@@ -32,7 +32,8 @@ struct Summary {
   double ratio_lpe = 0.0;  ///< The same for LPE.
   double updates = 0.0;    ///< Mean per run.
   int updates_possible = 0;
-  int wrong_updates = 0;  ///< Sum over the runs.
+  int wrong_updates = 0;       ///< Sum over the runs.
+  int runs_with_new_maps = 0;  ///< Whose map was lost: errors there are in the first map's frame.
   double map_recall_pct = 0.0;
   double false_landmarks_pct = 0.0;
   double landmarks_in_range = 0.0;

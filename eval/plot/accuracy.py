@@ -127,7 +127,7 @@ def plot_graph(snapshot, file):
 
 def cell_label(row):
     return (f"{row['path']}\n{row['forest']}\n{row['sigma_cm']:.0f} cm {row['detection_pct']:.0f}%"
-            f"\n{row['interval_cm']:.0f} cm step")
+            f"\n{row['interval_cm']:.0f} cm step" + ("" if row["errors"] in (None, "independent") else f"\n{row['errors']}"))
 
 
 def plot_ratios(rows, file):

@@ -95,10 +95,10 @@ def _loops(name, drives, options, minutes):
 
 
 EXPERIMENTS = (
-    _eval("paths", "paths --runs 10 --seed 1 --jobs 2", 12),
+    _eval("paths", "paths --errors independent,shared,shared-wide --runs 10 --seed 1 --jobs 2", 24),
     _eval("paths-lidar", "paths --method lidar --runs 10 --seed 2 --jobs 2", 14),
     _eval("density", "density --runs 10 --seed 1 --jobs 2", 8),
-    _eval("noise", "noise --runs 5 --seed 1 --jobs 2 --interval 20", 25),
+    _eval("noise", "noise --errors independent,shared,shared-wide --runs 5 --seed 1 --jobs 2 --interval 20", 27),
     _eval("noise-10cm", "noise --runs 2 --seed 1 --jobs 2 --interval 10", 25),
     _eval("baseline-batches", "paths --path circle --method baseline --runs 200 --seed 3 --jobs 2 --no-plots", 12),
     _eval("baseline-paths",
@@ -122,7 +122,7 @@ EXPERIMENTS = (
     _eval("existence", "existence --runs 40 --seed 1 --jobs 2 --data DATA", 4, ("stem_censuses", "tree_existence")),
     _eval("existence-drives", "existence-drives --runs 4 --seed 1 --jobs 2", 8),
     _eval("existence-needed", "existence-needed --runs 10 --seed 1 --jobs 2", 8),
-    _eval("existence-census", "existence-census --seed 1 --jobs 2 --data DATA", 15, ("stem_censuses", "tree_existence")),
+    _eval("existence-census", "existence-census --errors independent,shared --seed 1 --jobs 2 --data DATA", 20, ("stem_censuses", "tree_existence")),
     _eval("existence-camera", "existence-camera --runs 3 --seed 1 --jobs 2", 6),
     _eval("partition", f"partition {TOWN} {SUBMAP_SIZES}", 12),
     _eval("partition-dynamic", f"partition-dynamic {TOWN}", 3),

@@ -68,15 +68,29 @@ def cells(rows, *keys):
 
 # ---------------------------------------------------------------- accuracy (paths, density, noise)
 
+def errors_of(row):
+    """Whether detections share errors from scan to scan; documents of before have independent ones alone."""
+    return row.get("errors") or "independent"
+
+
+def with_errors(document, errors):
+    """The rows whose detections have those errors."""
+    return [row for row in document["rows"] if errors_of(row) == errors]
+
+
 def accuracy_summary(document, key):
-    """One line per path or forest: published, the thesis's method, smoothing, limit."""
+    """One line per path or forest and kind of errors: published, the thesis's method, smoothing, limit. Errors of runs that lost their
+    map are in the frame of the first one and say nothing."""
+    rows = [row | {"errors": errors_of(row)} for row in document["rows"]]
     lines = []
-    for (name,), by in cells(document["rows"], key).items():
+    for (name, errors), by in cells(rows, key, "errors").items():
         smoothing = by["smoothing"]
-        lines.append((name, pair(smoothing, "published_"), pair(by["baseline"]), f"**{pair(smoothing)}**",
+        lines.append((name, errors, pair(smoothing, "published_"), pair(by["baseline"]), f"**{pair(smoothing)}**",
                       pair(by["oracle"]), number(smoothing["ratio"], 3), number(smoothing["ratio_lpe"], 3),
-                      f"{number(smoothing['updates'], 1)} of {smoothing['updates_possible']}"))
-    return table((key, "published", "baseline", "**smoothing**", "oracle", "RPE ratio", "LPE ratio", "updates"), lines)
+                      f"{number(smoothing['updates'], 1)} of {smoothing['updates_possible']}", number(smoothing["ate_cm"]),
+                      f"{smoothing.get('runs_with_new_maps', 0)} of {smoothing['runs']}"))
+    return table((key, "errors of detections", "published", "baseline", "**smoothing**", "oracle", "RPE ratio", "LPE ratio", "updates", "ATE of the last map cm",
+                  "runs that lost their map"), lines)
 
 
 def _share(value):
@@ -90,18 +104,18 @@ def accuracy_rows(document):
         sigma = row["sigma_cm"]
         updates = "-" if row.get("updates") is None else f"{number(row['updates'], 1)} of {row['updates_possible']}"
         lines.append((row["path"], row["forest"], "-" if sigma is None else f"{sigma:g}", _share(row["detection_pct"]),
-                      method(row), f"{number(row['rpe_cm'])} ± {number(row['rpe_cm_sd'])}", number(row["lpe_cm"]),
+                      "-" if sigma is None else errors_of(row), method(row), f"{number(row['rpe_cm'])} ± {number(row['rpe_cm_sd'])}", number(row["lpe_cm"]),
                       number(row["ratio"], 3), number(row["ratio_lpe"], 3), updates, row["wrong_updates"],
                       number(row["map_recall_pct"], 1), number(row["false_landmarks_pct"]), number(row["ate_cm"]),
                       number(row["nees"]), pair(row, "published_"), number(row.get("published_updates"), 1)))
-    return table(("path", "forest", "noise cm", "detection", "method", "RPE cm ± sd of a run", "LPE cm", "RPE ratio",
+    return table(("path", "forest", "noise cm", "detection", "errors", "method", "RPE cm ± sd of a run", "LPE cm", "RPE ratio",
                   "LPE ratio", "updates", "wrong", "recall %", "false %", "ATE cm", "NEES (3)",
                   "published RPE / LPE", "published updates"), lines)
 
 
 def noise_matrix(document):
     """Smoothing by noise and detection rate; in brackets the published figures, then the ratio to the oracle."""
-    groups = cells(document["rows"], "sigma_cm", "detection_pct")
+    groups = cells(with_errors(document, "independent"), "sigma_cm", "detection_pct")
     rates = sorted({rate for _, rate in groups}, reverse=True)
     lines = []
     for sigma in sorted({sigma for sigma, _ in groups}):
@@ -114,8 +128,8 @@ def noise_matrix(document):
 
 
 def noise_worst(document):
-    """Worst ratio, lost and wrong updates of smoothing over all cells."""
-    rows = [row for row in document["rows"] if method(row) == "smoothing"]
+    """Worst ratio, lost and wrong updates of smoothing over all cells with independent errors."""
+    rows = [row for row in with_errors(document, "independent") if method(row) == "smoothing"]
     worst = max(row["ratio"] for row in rows if row["ratio"] is not None)
     lost = sum(row["updates"] != row["updates_possible"] for row in rows)
     wrong = sum(row["wrong_updates"] for row in rows)
@@ -124,6 +138,22 @@ def noise_worst(document):
     beaten = "below the published figures in every cell" if not above else \
         f"below the published figures except at {', '.join(above)}"
     return [f"Smoothing: worst RPE ratio {worst:.3f}; {beaten}; cells with lost updates: {lost}; wrong updates: {wrong}."]
+
+
+def noise_shared(document):
+    """The cells that are measured with shared errors as well, with the independent ones beside them; nothing where there are none."""
+    rows = [row | {"errors": errors_of(row)} for row in document["rows"]]
+    shared = {(row["sigma_cm"], row["detection_pct"]) for row in rows if row["errors"] != "independent"}
+    lines = []
+    for (sigma, rate, errors), by in cells(rows, "sigma_cm", "detection_pct", "errors").items():
+        if (sigma, rate) in shared:
+            smoothing = by["smoothing"]
+            lines.append((f"{sigma:g} cm, {rate:g} %", errors, pair(by["baseline"]), f"**{pair(smoothing)}**", pair(by["oracle"]),
+                          number(smoothing["ratio"], 3), number(smoothing["ratio_lpe"], 3),
+                          f"{number(smoothing['updates'], 1)} of {smoothing['updates_possible']}", number(smoothing["ate_cm"]), f"{smoothing['runs_with_new_maps']} of {smoothing['runs']}"))
+    head = ("noise, detection", "errors of detections", "baseline", "**smoothing**", "oracle", "RPE ratio", "LPE ratio", "updates",
+            "ATE of the last map cm", "runs that lost their map")
+    return table(head, lines) + [""] if lines else []
 
 
 def batches(document, size=10):

@@ -1,6 +1,6 @@
 """Tables of what is still there: see tables.py."""
 
-from render import folded, number, table
+from render import errors_of, folded, number, table
 
 
 def _of_drive(rows, keys):
@@ -93,7 +93,7 @@ def existence_census(document):
         groups = {}
         for row in rows:
             if row["part"] == part:
-                groups.setdefault((row["missed_pct"], row["has_ranges"], row["drives"]), {}).setdefault(row["method"], []).append(row)
+                groups.setdefault((row["missed_pct"], row["has_ranges"], errors_of(row), row["drives"]), {}).setdefault(row["method"], []).append(row)
         if groups:
             lines += ["", *table(*columns(groups))] if lines else table(*columns(groups))
     return lines
@@ -109,15 +109,15 @@ _CENSUS_METHODS = ("existence tracker", "icosahedral", "true rates")
 
 
 def _census_change(groups):
-    head = ("missed per drive %", "VIEW_RANGES", "drives", "stems of the map", "gone",
+    head = ("missed per drive %", "VIEW_RANGES", "errors", "drives", "stems of the map", "gone",
             *(f"AUC: {method}" for method in _CENSUS_METHODS),
             *(f"found at 1 % wrongly removed: {method}" for method in _CENSUS_METHODS), "Brier: existence tracker", "Brier: true rates",
             "gone and out of use", "standing and out of use", "landmarks in use where nothing stands", "doubles in use", "placed", "ATE m")
 
     def line(key, methods):
-        missed, ranges, drives = key
+        missed, ranges, errors, drives = key
         total = lambda name: sum(row[name] for row in methods["existence tracker"])
-        return (number(missed, 0), "yes" if ranges else "no", drives, total("points"), total("gone"),
+        return (number(missed, 0), "yes" if ranges else "no", errors, drives, total("points"), total("gone"),
                 *(_of_runs(methods, method, "auc", 4) for method in _CENSUS_METHODS),
                 *(_of_runs(methods, method, "found_at_1_pct", 1) for method in _CENSUS_METHODS),
                 _of_runs(methods, "existence tracker", "brier", 4), _of_runs(methods, "true rates", "brier", 4),
@@ -128,13 +128,13 @@ def _census_change(groups):
 
 
 def _census_control(groups):
-    head = ("without change: missed per drive %", "VIEW_RANGES", "drives", "stems of the map", "out of use", "out of use %",
+    head = ("without change: missed per drive %", "VIEW_RANGES", "errors", "drives", "stems of the map", "out of use", "out of use %",
             "P below 0.2 %: existence tracker", "P below 0.2 %: icosahedral")
 
     def line(key, methods):
-        missed, ranges, drives = key
+        missed, ranges, errors, drives = key
         total = lambda name: sum(row[name] for row in methods["existence tracker"])
-        return (number(missed, 0), "yes" if ranges else "no", drives, total("there"), total("there_unused"),
+        return (number(missed, 0), "yes" if ranges else "no", errors, drives, total("there"), total("there_unused"),
                 number(100 * total("there_unused") / max(1, total("there"))),
                 *(_of_runs(methods, method, "wrongly_removed_pct", 2) for method in ("existence tracker", "icosahedral")))
 

@@ -39,7 +39,7 @@ def _accuracy(summary):
 
 
 def _noise(document):
-    return [*render.noise_matrix(document), "", *render.noise_worst(document), "",
+    return [*render.noise_matrix(document), "", *render.noise_worst(document), "", *render.noise_shared(document),
             *render.folded("all rows", render.accuracy_rows(document))]
 
 
@@ -219,6 +219,7 @@ def summary(documents):
     """The rows of the project's README."""
     circle = row_of(documents["paths"], path="circle", method="smoothing")
     limit = row_of(documents["paths"], path="circle", method="oracle")
+    # Independent errors, as published: the first row of its cell.
     noisy = row_of(documents["noise"], sigma_cm=40.0, detection_pct=80.0, method="smoothing")
     once = row_of(documents["large-map"], setting="default", method="smoothing")
     park = documents["victoria-park"]["rows"][0]

@@ -1,5 +1,6 @@
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -42,11 +43,53 @@ TEST_CASE("Results do not depend on the number of jobs", "[campaign]") {
   CHECK(rows[1]["method"] == "oracle");
   CHECK(rows[1]["updates"] == 25);
   CHECK(rows[1]["interval_cm"] == 100.0);
+  CHECK(rows[1]["errors"] == "independent");
+  CHECK(rows[0]["runs_with_new_maps"] == 0);
   CHECK(rows[1]["ratio"].get<double>() == 1.0);
   for (const char* key :
        {"path", "forest", "sigma_cm", "detection_pct", "interval_cm", "rpe_cm", "lpe_cm", "ratio",
         "ratio_lpe", "updates", "updates_possible", "wrong_updates"}) {
     CHECK(rows[0].contains(key));
+  }
+}
+
+TEST_CASE("Shared errors have the power of independent ones, last from scan to scan and are stated",
+          "[campaign]") {
+  eval::harness::Cell cell;
+  cell.forest = sim::ForestKind::kSparse;
+  for (const harness::Errors errors :
+       {harness::Errors::kIndependent, harness::Errors::kShared, harness::Errors::kSharedWide}) {
+    cell.errors = errors;
+    CHECK(harness::errors_named(to_string(errors)) == errors);
+    const bool is_shared = errors != harness::Errors::kIndependent;
+    const double stated_m = (errors == harness::Errors::kSharedWide ? 3.0 : 1.0) * cell.sigma_m;
+    const eval::harness::RecordedDrive recorded(cell.drive(), 5);
+    std::map<std::uint32_t, Eigen::Vector2d> before;
+    double squares = 0.0, products = 0.0;
+    int detections = 0, pairs = 0;
+    for (const sim::SimulatedScan& scan : recorded.scans) {
+      std::map<std::uint32_t, Eigen::Vector2d> now;
+      for (std::size_t i = 0; i < scan.trunks.size(); ++i) {
+        const model::Detection& detection = scan.scan.detections[i];
+        CHECK(detection.covariance_m2(0, 0) == Approx(stated_m * stated_m));
+        const Eigen::Vector2d seen_m =
+            scan.world_T_vehicle * Eigen::Vector2d(detection.position_m.head<2>());
+        const Eigen::Vector2d error_m = seen_m - recorded.drive.forest().trunks_m[scan.trunks[i]];
+        now[scan.trunks[i]] = error_m;
+        squares += error_m.squaredNorm();
+        ++detections;
+        if (const auto found = before.find(scan.trunks[i]); found != before.end()) {
+          products += error_m.dot(found->second);
+          ++pairs;
+        }
+      }
+      before = std::move(now);
+    }
+
+    REQUIRE(pairs > 1000);
+    const double variance = squares / (2.0 * detections);
+    CHECK(variance == Approx(cell.sigma_m * cell.sigma_m).epsilon(0.2));
+    CHECK(products / (2.0 * pairs) / variance == Approx(is_shared ? 0.95 : 0.0).margin(0.05));
   }
 }
 

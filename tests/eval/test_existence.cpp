@@ -1,11 +1,13 @@
 // The experiment on existence: scores by hand, peers against brute force, worlds.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "eval/experiments/existence/census/census_drive.hpp"
 #include "eval/experiments/existence/csv.hpp"
 #include "eval/experiments/existence/forest.hpp"
 #include "eval/experiments/existence/observer.hpp"
@@ -190,4 +192,48 @@ TEST_CASE("Big Woods has the change that its README states", "[existence][record
   for (const CensusStem& stem : stems) gone += stem.is_gone ? 1 : 0;
   CHECK(stems.size() == 8302);
   CHECK(gone == 408);
+}
+
+TEST_CASE("A drive through a census shares its errors from place to place and states all of them",
+          "[existence]") {
+  std::vector<CensusStem> stems;
+  std::mt19937_64 random(17);
+  std::uniform_real_distribution<float> place(0.0F, 120.0F);
+  for (int i = 0; i < 400; ++i) stems.push_back({{place(random), place(random)}, 0.1F});
+  ForestSetting setting;
+  setting.scan_every_m = 0.5;
+  const StemGrid grid(stems, setting.range_m);
+
+  for (const bool is_shared : {false, true}) {
+    const census::CensusErrors errors = census::census_errors(is_shared);
+    const std::vector<geometry::SE2> path = census::lanes_there_and_back(stems, setting, 3.0);
+    ForestDrive looks(stems, grid, setting, false, random);
+    census::CensusDrive drive(looks, path, 1, errors, 5, 6, random);
+    std::map<std::uint32_t, Eigen::Vector2d> before;
+    double squares = 0.0, products = 0.0;
+    int detections = 0, pairs = 0;
+    for (std::size_t at = 0; const auto scan = drive.next(setting.range_m); ++at) {
+      std::map<std::uint32_t, Eigen::Vector2d> now;
+      for (std::size_t i = 0; i < scan->stems.size(); ++i) {
+        const model::Detection& detection = scan->landmarks.detections[i];
+        const double stated_m2 = detection.covariance_m2(0, 0);
+        CHECK(stated_m2 == Approx(errors.stated_sigma_m * errors.stated_sigma_m));
+        const Eigen::Vector2d seen_m = path[at] * Eigen::Vector2d(detection.position_m.head<2>());
+        const std::uint32_t stem = scan->stems[i];
+        now[stem] = seen_m - stems[stem].place_m.cast<double>();
+        squares += now[stem].squaredNorm();
+        ++detections;
+        if (const auto found = before.find(stem); found != before.end()) {
+          products += now[stem].dot(found->second);
+          ++pairs;
+        }
+      }
+      before = std::move(now);
+    }
+
+    REQUIRE(pairs > 1000);
+    const double variance = squares / (2.0 * detections);
+    CHECK(std::sqrt(variance) == Approx(errors.stated_sigma_m).epsilon(0.1));
+    CHECK(products / (2.0 * pairs) / variance == Approx(is_shared ? 0.93 : 0.0).margin(0.05));
+  }
 }

@@ -3,8 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
@@ -14,12 +16,16 @@
 namespace understory::eval::experiments::accuracy {
 namespace {
 
+/// Of detections, as `--errors` names them.
+using ErrorNames = std::vector<std::string>;
+
 /// Filters on the cells of the noise grid.
 struct NoiseOptions {
   harness::CampaignOptions campaign;
   std::vector<int> sigmas_cm;
   std::vector<int> detections_pct;
   std::vector<int> intervals_cm{20, 10};
+  ErrorNames errors{"independent"};
 };
 
 template <typename Value>
@@ -27,7 +33,18 @@ bool selected(const std::vector<Value>& filter, const Value& value) {
   return filter.empty() || std::find(filter.begin(), filter.end(), value) != filter.end();
 }
 
-std::vector<harness::Cell> path_cells(const std::vector<std::string>& names) {
+/// The cell with each of the wanted errors. Published figures are for independent ones.
+void add_with_errors(harness::Cell cell, const ErrorNames& errors,
+                     std::vector<harness::Cell>& cells) {
+  for (const std::string& name : errors) {
+    cell.errors = harness::errors_named(name);
+    if (cell.errors != harness::Errors::kIndependent) cell.published.reset();
+    cells.push_back(cell);
+  }
+}
+
+std::vector<harness::Cell> path_cells(const std::vector<std::string>& names,
+                                      const ErrorNames& errors) {
   std::vector<harness::Cell> cells;
   for (const sim::PathKind path :
        {sim::PathKind::kCircle, sim::PathKind::kLine, sim::PathKind::kFigureEight,
@@ -36,7 +53,7 @@ std::vector<harness::Cell> path_cells(const std::vector<std::string>& names) {
     harness::Cell cell;
     cell.path = path;
     cell.published = harness::published_path_figures(path);
-    cells.push_back(cell);
+    add_with_errors(cell, errors, cells);
   }
   return cells;
 }
@@ -51,6 +68,19 @@ std::vector<harness::Cell> density_cells() {
     cells.push_back(cell);
   }
   return cells;
+}
+
+/// Those two of the grid that are measured with shared errors as well: that of the paths, and the
+/// largest noise.
+bool is_measured_with_shared_errors(int sigma_cm, int detection_pct) {
+  return (sigma_cm == 20 && detection_pct == 90) || (sigma_cm == 40 && detection_pct == 80);
+}
+
+ErrorNames errors_of_cell(const ErrorNames& wanted, int sigma_cm, int detection_pct) {
+  ErrorNames errors = wanted;
+  if (!is_measured_with_shared_errors(sigma_cm, detection_pct))
+    std::erase_if(errors, [](const std::string& one) { return one != "independent"; });
+  return errors;
 }
 
 std::vector<harness::Cell> noise_cells(const NoiseOptions& options) {
@@ -71,7 +101,7 @@ std::vector<harness::Cell> noise_cells(const NoiseOptions& options) {
         const auto detection_pct = static_cast<int>(std::lround(100.0 * cell.detection));
         if (!selected(options.sigmas_cm, sigma_cm)) continue;
         if (!selected(options.detections_pct, detection_pct)) continue;
-        cells.push_back(cell);
+        add_with_errors(cell, errors_of_cell(options.errors, sigma_cm, detection_pct), cells);
       }
     }
   }
@@ -80,6 +110,7 @@ std::vector<harness::Cell> noise_cells(const NoiseOptions& options) {
 
 void run_accuracy(const std::string& experiment, const std::vector<harness::Cell>& cells,
                   harness::CampaignOptions options) {
+  if (cells.empty()) throw std::runtime_error("no cell has what was asked for");
   const auto lidar =
       std::find(options.methods.begin(), options.methods.end(), harness::kLidarMethod);
   if (lidar != options.methods.end()) options.methods.insert(lidar + 1, harness::kLidarFilter);
@@ -99,6 +130,26 @@ void run_accuracy(const std::string& experiment, const std::vector<harness::Cell
     harness::plot("accuracy.py", {options.json, harness::traces_file(options.json).string()});
 }
 
+void add_errors_option(CLI::App& command, ErrorNames& errors, const std::string& where) {
+  command
+      .add_option("--errors", errors,
+                  "independent: white noise; shared: of the same power, as measured on a recorded "
+                  "walk; shared-wide: the same, stated three times as large" +
+                      where)
+      ->delimiter(',')
+      ->check(CLI::IsMember({"shared", "shared-wide", "independent"}))
+      ->capture_default_str();
+}
+
+/// The method lidar has the errors of its own sensors.
+void check_errors(const ErrorNames& errors, const harness::CampaignOptions& options) {
+  const std::vector<std::string>& methods = options.methods;
+  const bool are_white =
+      std::ranges::all_of(errors, [](const std::string& one) { return one == "independent"; });
+  if (!are_white && std::ranges::count(methods, std::string(harness::kLidarMethod)) > 0)
+    throw std::runtime_error("--errors shared is of ideal detections, not of the method lidar");
+}
+
 }  // namespace
 
 void add_paths_experiment(CLI::App& eval) {
@@ -111,8 +162,13 @@ void add_paths_experiment(CLI::App& eval) {
       ->delimiter(',')
       ->check(
           CLI::IsMember({"circle", "line", "figure-eight", "double-circle", "square", "triangle"}));
-  command.callback([options, paths] {
-    run_guarded("paths", [&] { run_accuracy("paths", path_cells(*paths), *options); });
+  const auto errors = std::make_shared<ErrorNames>(ErrorNames{"independent"});
+  add_errors_option(command, *errors, "");
+  command.callback([options, paths, errors] {
+    run_guarded("paths", [&] {
+      check_errors(*errors, *options);
+      run_accuracy("paths", path_cells(*paths, *errors), *options);
+    });
   });
 }
 
@@ -140,6 +196,8 @@ void add_noise_experiment(CLI::App& eval) {
       ->delimiter(',')
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
+  add_errors_option(command, options->errors,
+                    "; shared ones in the cells of 20 cm, 90 % and of 40 cm, 80 %");
   command.callback([options] {
     run_guarded("noise", [&] { run_accuracy("noise", noise_cells(*options), options->campaign); });
   });

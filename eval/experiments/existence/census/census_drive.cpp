@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kSpeed_mps = 2.0;
-constexpr double kDetectionSigma_m = 0.03;
 constexpr double kBreast_m = 1.3;
 /// Of odometry from place to place.
 constexpr double kStepSigma_m = 0.003;
@@ -54,9 +53,20 @@ std::vector<geometry::SE2> lanes_there_and_back(const std::vector<CensusStem>& s
   }
 }
 
+CensusErrors census_errors(bool are_shared) {
+  if (!are_shared) return {};
+  return {sim::kMeasuredIndependentSigmaM, sim::measured_sigma_m(), sim::measured_shared_errors()};
+}
+
 CensusDrive::CensusDrive(ForestDrive& looks, std::vector<geometry::SE2> path, model::Utime begin,
-                         std::mt19937_64& random)
-    : looks_(looks), path_(std::move(path)), begin_(begin), random_(random) {}
+                         const CensusErrors& errors, std::uint64_t forest_seed,
+                         std::uint64_t drive_seed, std::mt19937_64& random)
+    : looks_(looks),
+      path_(std::move(path)),
+      begin_(begin),
+      errors_(errors),
+      shared_(errors.shared, forest_seed, drive_seed),
+      random_(random) {}
 
 std::optional<CensusScan> CensusDrive::next(double range_m) {
   if (next_ == path_.size()) return std::nullopt;
@@ -67,6 +77,7 @@ std::optional<CensusScan> CensusDrive::next(double range_m) {
 
   const double way_m =
       index == 0 ? 0.0 : (pose.translation() - path_[index - 1].translation()).norm();
+  along_m_ += way_m;
   CensusScan scan;
   if (index > 0) {
     const model::Utime before = begin_;
@@ -105,11 +116,14 @@ model::LandmarkScan CensusDrive::landmarks_at(const geometry::SE2& pose, std::si
     if (!look.is_seen) continue;
     const Eigen::Vector2d stem_m =
         pose.translation() - look.look.from_point_m.head<2>().cast<double>();
-    const Eigen::Vector2d seen_m =
-        pose.inverse() * stem_m + kDetectionSigma_m * Eigen::Vector2d(draw(), draw());
+    const Eigen::Vector2d true_m = pose.inverse() * stem_m;
+    const Eigen::Vector2d seen_m = true_m +
+                                   errors_.independent_sigma_m * Eigen::Vector2d(draw(), draw()) +
+                                   shared_.error_m(look.point, true_m, pose, along_m_);
     model::Detection detection;
     detection.position_m = {seen_m.x(), seen_m.y(), kBreast_m};
-    detection.covariance_m2 = kDetectionSigma_m * kDetectionSigma_m * Eigen::Matrix3d::Identity();
+    detection.covariance_m2 =
+        errors_.stated_sigma_m * errors_.stated_sigma_m * Eigen::Matrix3d::Identity();
     detection.radius_m =
         static_cast<double>(view[i].distance_m) * std::sin(static_cast<double>(view[i].half_width));
     scan.detections.push_back(detection);

@@ -15,6 +15,7 @@
 #include "eval/experiments/existence/census/census_drive.hpp"
 #include "eval/experiments/existence/census/landmark_stems.hpp"
 #include "eval/harness/drive_map.hpp"
+#include "sim/hash_random.hpp"
 
 namespace understory::eval::experiments::existence::census {
 namespace {
@@ -152,7 +153,9 @@ CensusRun run_census(const std::vector<CensusStem>& stems, const CensusOptions& 
     const double shift_m =
         std::uniform_real_distribution<double>(0.0, 0.5 * setting.lane_m)(random);
     const std::vector<geometry::SE2> path = lanes_there_and_back(stems, setting, shift_m);
-    CensusDrive drive(looks, path, static_cast<model::Utime>(1e6 * (1.0 + time_s)), random);
+    CensusDrive drive(looks, path, static_cast<model::Utime>(1e6 * (1.0 + time_s)),
+                      census_errors(options.share_errors), seed,
+                      sim::mixed(seed, static_cast<std::uint64_t>(k)), random);
     harness::ChainRun run =
         drive_processes(drive, options, map, path.size(), path, names,
                         [&](double done) { progress((k + done) / (setting.drives + 1)); });
