@@ -7,9 +7,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/bus/bulk_group.hpp"
 #include "common/bus/launch_config.hpp"
 #include "common/bus/service.hpp"
-#include "common/bus/split_bus.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/printable.hpp"
 #include "deploy/cli/commands.hpp"

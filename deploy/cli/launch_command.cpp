@@ -11,11 +11,11 @@
 #include <optional>
 #include <regex>
 
+#include "common/bus/bulk_group.hpp"
 #include "common/bus/device.hpp"
 #include "common/bus/launch_config.hpp"
 #include "common/bus/live_bus.hpp"
 #include "common/bus/parameter_table.hpp"
-#include "common/bus/split_bus.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/given_map_option.hpp"
