@@ -16,9 +16,10 @@ std::uint64_t refused_messages(const EkfCounters& counters) {
 void describe(HealthParameters& p, bus::ParameterTable& table) {
   table.add("health.min_observations", p.min_observations, {1, 10000}, "",
             "A scan with fewer landmarks says nothing about them.");
-  table.add("health.lost_sigma_m", p.lost_sigma_m, {0.01, 1e6}, "m",
-            "With a larger standard deviation of the position since its map began the filter is "
-            "lost.");
+  table.add(
+      "health.lost_sigma_m", p.lost_sigma_m, {0.01, 1e6}, "m",
+      "With a larger standard deviation of the position the filter is lost, unless its map began "
+      "with one.");
   table.add(
       "health.nis_sigmas", p.nis_sigmas, {1.0, 100.0}, "sigma",
       "A scan's innovations are too large where their squared distance exceeds its expectation "
@@ -56,9 +57,10 @@ void HealthWatch::add_scan(const ScanFit& scan, const model::EkfPose& pose) {
       scan.observed >= static_cast<std::uint32_t>(parameters_.min_observations);
   const Eigen::Matrix2d position = pose.covariance.topLeftCorner<2, 2>();
   const double sigma_m = std::sqrt(geometry::eigenvalues(position).maxCoeff());
-  if (has_restarted_) start_sigma_m_ = sigma_m;
+  const bool is_certain = sigma_m <= parameters_.lost_sigma_m;
+  knows_place_ = is_certain || (knows_place_ && !has_restarted_);
   has_restarted_ = false;
-  const bool is_uncertain = !(sigma_m <= std::hypot(parameters_.lost_sigma_m, start_sigma_m_));
+  const bool is_uncertain = knows_place_ && !is_certain;
   if (has_landmarks || is_uncertain) {
     lost_.condition.add(is_uncertain || scan.used == 0);
   }
