@@ -15,7 +15,7 @@ PARTITION = "--seed 1 --jobs 2 --front-end ideal,lidar --recordings OUT/partitio
 TOWN = f"{PARTITION} --runs 20 --lidar-runs 20 --routes urban"
 COUNTRY = f"{PARTITION} --runs 20 --lidar-runs 20 --routes urban-countryside"
 # Drives at their own speed, four minutes each: of the long campaign 24 (`deploy/campaign --long`).
-RELIABILITY = "reliability --drives 4 --first-seed 1001 --length-m 1000 --config deploy/config/lidar"
+RELIABILITY = "reliability --drives 2 --first-seed 1001 --length-m 1000 --config deploy/config/lidar"
 SUBMAP_SIZES = "--size-m 20,100,200,300,400,500"
 
 
@@ -140,8 +140,8 @@ EXPERIMENTS = (
     _eval("health", "health --drives 1000 --seed 1", 8),
     _eval("closures", "closures --runs 100 --plantations 4 --seed 1 --jobs 2", 8),
     _eval("gaps", "gaps --seeds 5 --first-seed 801 --jobs 2", 15),
-    _eval("reliability-load-0", f"{RELIABILITY} --load 0", 20),
-    _eval("reliability-load-8", f"{RELIABILITY} --load 8", 20),
+    _eval("reliability-load-0", f"{RELIABILITY} --load 0", 10),
+    _eval("reliability-load-8", f"{RELIABILITY} --load 8", 10),
     _eval("misstated", "misstated --runs 10 --seed 2001", 4),
     _eval("victoria-park", "victoria-park --data DATA", 1, ("victoria_park_raw", "victoria_park_landmark")),
     _eval("frontend-chain", "frontend --only chain --config deploy/config/lidar --jobs 2 --data DATA", 25,

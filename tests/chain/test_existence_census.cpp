@@ -62,7 +62,7 @@ TEST_CASE("a drive's messages are its looks, and what stands stops the beams", "
   const StemGrid grid(stems, setting.range_m);
   ForestDrive looks(stems, grid, setting, true, random);
   const auto path = lanes_there_and_back(stems, setting, 3.0);
-  CensusDrive drive(looks, path, 1'000'000, random);
+  CensusDrive drive(looks, path, 1'000'000, CensusErrors{}, 6, 6, random);
   std::size_t seen = 0;
   for (std::size_t i = 0; const auto scan = drive.next(setting.range_m); ++i) {
     REQUIRE(scan->stems.size() == scan->landmarks.detections.size());

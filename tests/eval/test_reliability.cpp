@@ -126,7 +126,8 @@ TEST_CASE("poses that end, and poses that are broken, are found", "[reliability]
 
 TEST_CASE("delays are apart, and of every kind", "[reliability]") {
   std::mt19937_64 random(6);
-  DelayPlan plan{.processes = {"ekf", "associator"}};
+  DelayPlan plan;
+  plan.processes = {"ekf", "associator"};
   const std::vector<Fault> faults = draw_delays(plan, 300, random);
   REQUIRE(faults.size() == 300);
   std::map<std::string, int> kinds;

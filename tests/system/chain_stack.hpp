@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "common/bus/bulk_group.hpp"
 #include "common/geometry/decompositions.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/model/ekf_output.hpp"
