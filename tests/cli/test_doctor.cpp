@@ -76,7 +76,7 @@ TEST_CASE("doctor knows URLs that no bus is on and those that leave the computer
   };
   CHECK(on("udpm://239.255.76.67:7667?ttl=0", "239.255.76.67") == Verdict::kGood);
   CHECK(on("udpm://239.255.76.67:7667?ttl=1", "above 0") == Verdict::kAdvice);
-  CHECK(on("udpm://239.255.76.67:7667?ttl=x", "no number") == Verdict::kBad);
+  CHECK(on("udpm://239.255.76.67:7667?ttl=x", "no TTL") == Verdict::kBad);
   CHECK(on("udpm://10.0.0.1:7667", "no IPv4 multicast group") == Verdict::kBad);
   CHECK(on("udpm://239.255.76.67:seven", "no port") == Verdict::kBad);
   CHECK(on("file:///tmp/x.lcm", "no udpm://") == Verdict::kBad);
