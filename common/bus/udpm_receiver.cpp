@@ -82,16 +82,17 @@ DatagramFaults UdpmReceiver::faults() const {
 }
 
 void UdpmReceiver::run() noexcept {
+  std::vector<pollfd> files = {{wake_, POLLIN, 0}};
   while (true) {
-    std::vector<pollfd> files = {{wake_, POLLIN, 0}};
-    for (const Group& group : groups_)
-      files.push_back({group.socket->file_descriptor(), POLLIN, 0});
     ::poll(files.data(), files.size(), earliest() != nullptr ? 0 : -1);
 
     if (files.front().revents != 0) {
       const std::lock_guard lock(mutex_);
       if (ends_) return;
       take_in_joined();
+      files.resize(1);
+      for (const Group& group : groups_)
+        files.push_back({group.socket->file_descriptor(), POLLIN, 0});
     }
     take_batch();
     note_faults();

@@ -123,6 +123,7 @@ class LidarImuInputAdapter : public bus::Adapter {
   void load(const std::string& state) override {
     stage_->load(state);
     show_silence();
+    show_gravity();
   }
 
  private:

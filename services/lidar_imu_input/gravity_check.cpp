@@ -83,10 +83,15 @@ GravityVerdict GravityCheck::judge() const {
 }
 
 std::string GravityCheck::text() const {
+  using enum GravityVerdict;
+  // Asked with every sample.
+  if (verdict_ == kUnknown || verdict_ == kRight || verdict_ == kInG) return "";
+
   const Eigen::Vector3d& f = mean_mps2_;
   const std::string mending =
       fmt::format("imu.mount roll_rad = {:.2f}, pitch_rad = {:.2f} would make it upwards",
                   std::atan2(f.y(), f.z()), std::atan2(-f.x(), f.tail<2>().norm()));
+
   switch (verdict_) {
     case GravityVerdict::kPointsDown:
       return "at rest the force points down: the IMU is upside down (" + mending +
