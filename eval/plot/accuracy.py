@@ -131,8 +131,10 @@ def cell_label(row):
 
 
 def plot_ratios(rows, file):
-    """RPE and LPE over the oracle's; the published figures over the same oracle as crosses."""
-    oracle = {cell_label(r): r for r in rows if r["method"] == "oracle" and r["rpe_cm"] > 1e-4}
+    """RPE and LPE over the oracle's; the published figures over the same oracle as crosses. A cell with runs that lost their
+    map has no ratio: its errors are in the frame of the first map."""
+    lost = {cell_label(r): r["runs_with_new_maps"] for r in rows if r.get("runs_with_new_maps")}
+    oracle = {cell_label(r): r for r in rows if r["method"] == "oracle" and r["rpe_cm"] > 1e-4 and cell_label(r) not in lost}
     if not oracle:
         return
     labels = list(oracle)
@@ -153,6 +155,8 @@ def plot_ratios(rows, file):
         axis.set_ylabel(f"{name} / oracle")
         axis.grid(axis="y", which="both", alpha=0.3)
     axes[0].legend()
+    if lost:
+        axes[0].set_title(f"left out: {len(lost)} cells with shared errors, where {sum(lost.values())} runs lost their map", fontsize=9)
     axes[1].set_xticks(range(len(labels)), labels, fontsize=7)
     figure.tight_layout()
     figure.savefig(file, dpi=110)
