@@ -78,6 +78,13 @@ def with_errors(document, errors):
     return [row for row in document["rows"] if errors_of(row) == errors]
 
 
+def _ratios(row):
+    """RPE and LPE over the oracle's; none where runs lost their map: their errors are in the frame of the first one."""
+    if row.get("runs_with_new_maps"):
+        return "-", "-"
+    return number(row["ratio"], 3), number(row["ratio_lpe"], 3)
+
+
 def accuracy_summary(document, key):
     """One line per path or forest and kind of errors: published, the thesis's method, smoothing, limit. Errors of runs that lost their
     map are in the frame of the first one and say nothing."""
@@ -86,7 +93,7 @@ def accuracy_summary(document, key):
     for (name, errors), by in cells(rows, key, "errors").items():
         smoothing = by["smoothing"]
         lines.append((name, errors, pair(smoothing, "published_"), pair(by["baseline"]), f"**{pair(smoothing)}**",
-                      pair(by["oracle"]), number(smoothing["ratio"], 3), number(smoothing["ratio_lpe"], 3),
+                      pair(by["oracle"]), *_ratios(smoothing),
                       f"{number(smoothing['updates'], 1)} of {smoothing['updates_possible']}", number(smoothing["ate_cm"]),
                       f"{smoothing.get('runs_with_new_maps', 0)} of {smoothing['runs']}"))
     return table((key, "errors of detections", "published", "baseline", "**smoothing**", "oracle", "RPE ratio", "LPE ratio", "updates", "ATE of the last map cm",
@@ -149,7 +156,7 @@ def noise_shared(document):
         if (sigma, rate) in shared:
             smoothing = by["smoothing"]
             lines.append((f"{sigma:g} cm, {rate:g} %", errors, pair(by["baseline"]), f"**{pair(smoothing)}**", pair(by["oracle"]),
-                          number(smoothing["ratio"], 3), number(smoothing["ratio_lpe"], 3),
+                          *_ratios(smoothing),
                           f"{number(smoothing['updates'], 1)} of {smoothing['updates_possible']}", number(smoothing["ate_cm"]), f"{smoothing['runs_with_new_maps']} of {smoothing['runs']}"))
     head = ("noise, detection", "errors of detections", "baseline", "**smoothing**", "oracle", "RPE ratio", "LPE ratio", "updates",
             "ATE of the last map cm", "runs that lost their map")
