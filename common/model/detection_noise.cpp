@@ -25,9 +25,7 @@ constexpr double kMostChi2 = 9.0;
 /// fade depends on the sensor and changes less.
 constexpr double kMemory = 600.0;
 constexpr double kLagMemory = 8000.0;
-/// Degrees of freedom from which on a lag counts, and standard deviations of chance beyond which it
-/// shows a correlation.
-constexpr double kLeastLagDegrees = 300.0;
+/// Standard deviations of chance beyond which a lag shows a correlation.
 constexpr double kLagSigmas = 6.0;
 /// Growth of the variogram to the longest lag from which on errors outlast what is compared.
 constexpr double kMostGrowth = 0.15;
@@ -49,8 +47,6 @@ constexpr double kAfterChange = 0.3;
 constexpr double kChanged = 0.69;  // doubled or halved
 /// Factors of the variance to try: four times the sigma, a quarter and half of it.
 constexpr std::array<double, 3> kTries = {16.0, 1.0 / 16.0, 1.0 / 4.0};
-/// Degrees of freedom below which too little is learned to trust a gate: a few scans.
-constexpr double kNew = 300.0;
 /// Of a rescaled scan's chi^2 by its degrees of freedom. Pairs by chance have 2 and more.
 constexpr double kExplained = 1.4;
 /// A pair of which the motion takes nearly all says nothing.
@@ -154,8 +150,8 @@ void DetectionNoise::learn_lag(std::size_t lag) {
 
   // By the noise as learned: kinds and ranges are alike then.
   for (const Pair& pair : pairs) {
-    const auto [chi2, degrees] = left_over(pair, fit);
     Sums& sums = by_lag_[pair.bin / kRanges][lag];
+    const auto [chi2, degrees] = left_over(pair, fit, sums.mean());
     sums.chi2 += chi2;
     sums.degrees += degrees;
   }
@@ -163,16 +159,17 @@ void DetectionNoise::learn_lag(std::size_t lag) {
 }
 
 /// What a motion leaves of a pair, by the noise as learned so far, and of how many degrees of
-/// freedom: the motion takes a share of each. A large residual counts as kMostChi2; the mean allows
-/// for that.
-DetectionNoise::Sums DetectionNoise::left_over(const Pair& pair, const Fit& fit) const {
+/// freedom: the motion takes a share of each. A residual that is large beside the `usual` one
+/// counts as kMostChi2 of it; the mean allows for that.
+DetectionNoise::Sums DetectionNoise::left_over(const Pair& pair, const Fit& fit,
+                                               double usual) const {
   static const double kCut = 1.0 - std::exp(-0.5 * kMostChi2);
   const Residual residual = residual_of(pair, estimate(pair.bin), fit.then_T_now);
   const double taken = (fit.covariance * residual.information).trace();
   const double degrees = std::max(0.0, 2.0 - taken);
   const double share = 0.5 * degrees;
   if (share < kLeastShare) return {};
-  return {share * std::min(residual.chi2 / share, kMostChi2) / kCut, degrees};
+  return {share * std::min(residual.chi2 / share, usual * kMostChi2) / kCut, degrees};
 }
 
 /// The oldest of so many scans before the last one that has enough in common with it.
@@ -201,7 +198,7 @@ std::optional<ScanMotion> DetectionNoise::motion_over(std::size_t most_scans) co
 void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
   std::array<Sums, kKinds * kRanges> added{};
   for (const Pair& pair : pairs) {
-    const Sums left = left_over(pair, fit);
+    const Sums left = left_over(pair, fit, 1.0);
     added[pair.bin].chi2 += estimate(pair.bin) * left.chi2;
     added[pair.bin].degrees += left.degrees;
   }
@@ -284,7 +281,7 @@ std::array<LagVariance, DetectionNoise::kLags.size()> DetectionNoise::variogram(
   std::array<LagVariance, kLags.size()> lags{};
   for (std::size_t i = 0; i < kLags.size(); ++i) {
     lags[i].lag = kLags[i];
-    if (sums[i].degrees < kLeastLagDegrees) continue;
+    if (sums[i].degrees < kFewScans) continue;
     lags[i].value = sums[i].chi2 / sums[i].degrees;
     lags[i].degrees = sums[i].degrees;
   }
@@ -297,7 +294,7 @@ double DetectionNoise::repetition(LandmarkKind kind) const {
 
 /// Errors whose memory is longer than what is compared would pass for small ones.
 bool DetectionNoise::may_shrink(LandmarkKind kind) const {
-  return !outlasts(variogram(kind), kLag, kMostGrowth);
+  return !outlasts(variogram(kind), kMostGrowth);
 }
 
 double DetectionNoise::learned(std::size_t bin) const {
@@ -368,7 +365,7 @@ std::span<const double> DetectionNoise::tries() const {
 bool DetectionNoise::is_new() const {
   double degrees = 0.0;
   for (const Sums& sums : sums_) degrees += sums.degrees;
-  return parameters_.learn && degrees < kNew;
+  return parameters_.learn && degrees < kFewScans;
 }
 
 bool DetectionNoise::is_misstated() const {

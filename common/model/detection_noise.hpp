@@ -114,6 +114,9 @@ class DetectionNoise {
   /// Lags [scans] at which residuals are compared; the last one is within kLongLag.
   static constexpr std::array<std::size_t, 5> kLags = {1, 2, 4, 8, 16};
 
+  /// Degrees of freedom of a few scans.
+  static constexpr double kFewScans = 300.0;
+
   /// Scans after which factors that did not change are settled.
   static constexpr std::size_t kSettled = 200;
 
@@ -154,6 +157,8 @@ class DetectionNoise {
     double chi2 = 0.0;
     double degrees = 0.0;  ///< Of freedom.
 
+    /// 1 until a few scans are known.
+    double mean() const { return (kFewScans + chi2) / (kFewScans + degrees); }
     /// What is older counts less.
     void forget_beyond(double memory) {
       if (degrees <= memory) return;
@@ -191,7 +196,7 @@ class DetectionNoise {
   std::optional<Common> common_with_last(std::size_t most_scans) const;
   void learn(std::span<const Pair> pairs, const Fit& fit);
   void learn_lag(std::size_t lag);
-  Sums left_over(const Pair& pair, const Fit& fit) const;
+  Sums left_over(const Pair& pair, const Fit& fit, double usual) const;
   Fit fitted_motion(std::span<const Pair> pairs) const;
   static Residual residual_of(const Pair& pair, double factor, const geometry::SE2& then_T_now);
   std::array<LagVariance, kLags.size()> variogram(LandmarkKind kind) const;

@@ -68,11 +68,17 @@ double white_noise_power(std::span<const LagVariance> lags, std::size_t unit_lag
   return (variance + 2.0 * sum) / unit_value;
 }
 
-bool outlasts(std::span<const LagVariance> lags, std::size_t unit_lag, double most) {
-  const auto unit = std::ranges::find(lags, unit_lag, &LagVariance::lag);
-  if (unit == lags.end() || unit->degrees <= 0.0 || lags.back().degrees <= 0.0) return false;
-  const double chance = std::sqrt(2.0 / unit->degrees + 2.0 / lags.back().degrees);
-  return lags.back().value > unit->value * (1.0 + most + 2.0 * chance);
+bool outlasts(std::span<const LagVariance> lags, double most) {
+  const auto is_known = [](const LagVariance& one) { return one.degrees > 0.0; };
+  const auto shortest = std::ranges::find_if(lags, is_known);
+  if (shortest == lags.end()) return false;
+  const LagVariance& longest = *std::ranges::find_if(lags.rbegin(), lags.rend(), is_known);
+  const LagVariance& before = *std::ranges::find_if(shortest, lags.end(), [&](const auto& one) {
+    return is_known(one) && 4 * one.lag >= longest.lag;
+  });
+
+  const double chance = std::sqrt(2.0 / before.degrees + 2.0 / longest.degrees);
+  return longest.value > before.value * (1.0 + most + 2.0 * chance);
 }
 
 }  // namespace understory::model

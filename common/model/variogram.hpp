@@ -26,9 +26,9 @@ struct LagVariance {
 /// longest lag is not seen: the result is a lower bound then. Cost: linear in the longest lag.
 double white_noise_power(std::span<const LagVariance> lags, std::size_t unit_lag, double sigmas);
 
-/// Whether the memory is seen to be longer than the lags: the variogram at the longest of them is
-/// above that at `unit_lag` by more than a share `most` of it and two standard deviations of
-/// chance. False where too little is known to say so.
-bool outlasts(std::span<const LagVariance> lags, std::size_t unit_lag, double most);
+/// Whether the memory is seen to be longer than the lags: the variogram at the longest lag that is
+/// known is above that at a quarter of it, or at the shortest one, by more than a share `most` of
+/// it and two standard deviations of chance. False where too little is known to say so.
+bool outlasts(std::span<const LagVariance> lags, double most);
 
 }  // namespace understory::model

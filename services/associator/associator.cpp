@@ -8,7 +8,7 @@
 namespace understory::associator {
 namespace {
 
-constexpr state::Format kFormat{"associator", 4};
+constexpr state::Format kFormat{"associator", 5};
 
 geometry::SE2WithCovariance pose_of(const Localisation& located) {
   return {located.pose.reference_T_observed, located.pose.covariance};

@@ -1,7 +1,10 @@
 #include "common/model/detection_noise.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include "common/geometry/se2.hpp"
 #include "common/model/archive.hpp"
@@ -184,6 +187,36 @@ TEST_CASE("Noise shrinks only where its memory is shorter than what is compared"
         CHECK(noise.factor(kTrunk, 8.0) == Approx(0.1 * (1.0 + kept) / (1.0 - kept)).epsilon(0.35));
       }
     }
+  }
+}
+
+TEST_CASE("Errors that fade over fifty scans soon count as stated, and more once that is seen",
+          "[noise]") {
+  // The mean of so many independent errors, of which one is renewed at each scan.
+  constexpr std::size_t kMemory = 48;
+  constexpr double kSigma_m = 0.1;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Drive drive(seed, 40);
+    model::DetectionNoise noise;
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal(0.0, kSigma_m / std::sqrt(double(kMemory)));
+    const auto fresh = [&] { return Eigen::Vector2d(normal(random), normal(random)); };
+    std::vector<std::array<Eigen::Vector2d, kMemory>> shares(40);
+    for (auto& landmark : shares) std::ranges::generate(landmark, fresh);
+
+    for (std::size_t k = 0; k < 400; ++k) {
+      auto scan = drive.next(kSigma_m, [](double) { return 0.0; });
+      for (auto& landmark : shares) landmark[k % kMemory] = fresh();
+      for (std::size_t i = 0; i < scan.detections.size(); ++i)
+        for (const Eigen::Vector2d& share : shares[drive.tracks[i] - 1])
+          scan.detections[i].position_m.head<2>() += share;
+      noise.add(scan, drive.tracks);
+      CAPTURE(seed, k);
+      if (k >= 20) CHECK(noise.factor(kTrunk, 8.0) >= 1.0);
+    }
+    // What 16 scans show of them: a variogram of h / 48, power 16 * 16 / 48.
+    CAPTURE(seed);
+    CHECK(noise.factor(kTrunk, 8.0) == Approx(256.0 / 48.0).epsilon(0.4));
   }
 }
 

@@ -88,3 +88,21 @@ TEST_CASE("A variogram of which nothing is known has the power 1", "[variogram]"
   const std::array<model::LagVariance, 2> empty{{{1, 0.5, 0.0}, {4, 1.0, 0.0}}};
   CHECK(model::white_noise_power(empty, 4, 3.0) == 1.0);
 }
+
+TEST_CASE("Errors that fade slowly outlast the lags, however few of these are known",
+          "[variogram]") {
+  constexpr double kDegrees = 2000.0;
+  for (std::size_t known = 2; known <= kLags.size(); ++known) {
+    std::vector<model::LagVariance> white;
+    std::vector<model::LagVariance> slow;
+    for (std::size_t i = 0; i < kLags.size(); ++i) {
+      const double degrees = i < known ? kDegrees : 0.0;
+      white.push_back({kLags[i], 1.0, degrees});
+      slow.push_back({kLags[i], static_cast<double>(kLags[i]) / 4.0, degrees});
+    }
+    CAPTURE(known);
+    CHECK_FALSE(model::outlasts(white, 0.15));
+    CHECK(model::outlasts(slow, 0.15));
+  }
+  CHECK_FALSE(model::outlasts({}, 0.15));
+}
