@@ -37,6 +37,7 @@
 #include "understory/landmarks_t.hpp"
 #include "understory/lidar_scan_t.hpp"
 #include "understory/lidar_sweep_t.hpp"
+#include "understory/loop_closure2_t.hpp"
 #include "understory/loop_closure_t.hpp"
 #include "understory/loop_result_t.hpp"
 #include "understory/map_correction_t.hpp"
@@ -100,6 +101,8 @@ Result<model::SubmapQuery> from_wire(const submap_query_t& wire);
 /// Where the submaps are.
 Result<model::MapCorrection> from_wire(const map_correction_t& wire);
 /// A loop closure, or that one is taken back.
+Result<model::LoopClosure> from_wire(const loop_closure2_t& wire);
+/// The same of logs written before loop_closure2_t.
 Result<model::LoopClosure> from_wire(const loop_closure_t& wire);
 /// What became of a loop closure.
 Result<model::LoopResult> from_wire(const loop_result_t& wire);
@@ -161,7 +164,7 @@ submap_query_t to_wire(const model::SubmapQuery& query);
 /// Where the submaps are.
 map_correction_t to_wire(const model::MapCorrection& correction);
 /// A loop closure.
-loop_closure_t to_wire(const model::LoopClosure& closure);
+loop_closure2_t to_wire(const model::LoopClosure& closure);
 /// What became of a loop closure.
 loop_result_t to_wire(const model::LoopResult& result);
 /// Whether landmarks are still there.
@@ -268,6 +271,13 @@ template <>
 inline Result<model::SlamPose> decode_message<model::SlamPose>(
     std::span<const std::uint8_t> bytes) {
   return decode_either<model::SlamPose, slam_pose_t>(bytes);
+}
+
+/// Loop closures: older logs have loop_closure_t.
+template <>
+inline Result<model::LoopClosure> decode_message<model::LoopClosure>(
+    std::span<const std::uint8_t> bytes) {
+  return decode_either<model::LoopClosure, loop_closure_t>(bytes);
 }
 
 /// A value (or a wire type) to bytes.

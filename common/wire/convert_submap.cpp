@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <span>
+
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_map_parts.hpp"
 
@@ -162,7 +165,7 @@ map_correction_t to_wire(const model::MapCorrection& correction) {
   return wire;
 }
 
-Result<model::LoopClosure> from_wire(const loop_closure_t& wire) {
+Result<model::LoopClosure> from_wire(const loop_closure2_t& wire) {
   Checks checks;
   model::LoopClosure closure;
   closure.utime = wire.utime;
@@ -172,8 +175,8 @@ Result<model::LoopClosure> from_wire(const loop_closure_t& wire) {
   closure.source = wire.source;
   closure.is_revoked = wire.revoked != 0;
   if (!closure.is_revoked) {
-    closure.from = loop_end(wire.from, checks);
-    closure.to = loop_end(wire.to, checks);
+    closure.from = loop_end(wire.from_end, checks);
+    closure.to = loop_end(wire.to_end, checks);
     checks.pose("from_T_to", wire.from_T_to);
     closure.from_T_to.mean = from_wire(wire.from_T_to);
     closure.from_T_to.covariance = checks.covariance("covariance", wire.covariance);
@@ -187,16 +190,32 @@ Result<model::LoopClosure> from_wire(const loop_closure_t& wire) {
   return closure;
 }
 
-loop_closure_t to_wire(const model::LoopClosure& closure) {
-  loop_closure_t wire{};
+Result<model::LoopClosure> from_wire(const loop_closure_t& wire) {
+  loop_closure2_t same{};
+  same.utime = wire.utime;
+  same.seq = wire.seq;
+  same.map_id = wire.map_id;
+  same.closure_id = wire.closure_id;
+  same.source = wire.source;
+  same.revoked = wire.revoked;
+  same.from_end = wire.from;
+  same.to_end = wire.to;
+  same.from_T_to = wire.from_T_to;
+  std::ranges::copy(std::span(&wire.covariance[0][0], 9), &same.covariance[0][0]);
+  same.log10_false_alarm = wire.log10_false_alarm;
+  return from_wire(same);
+}
+
+loop_closure2_t to_wire(const model::LoopClosure& closure) {
+  loop_closure2_t wire{};
   wire.utime = closure.utime;
   wire.seq = static_cast<std::int64_t>(closure.sequence);
   wire.map_id = static_cast<std::int32_t>(closure.map_id);
   wire.closure_id = static_cast<std::int64_t>(closure.id);
   wire.source = closure.source;
   wire.revoked = closure.is_revoked ? 1 : 0;
-  wire.from = to_wire(closure.from);
-  wire.to = to_wire(closure.to);
+  wire.from_end = to_wire(closure.from);
+  wire.to_end = to_wire(closure.to);
   wire.from_T_to = to_wire(closure.from_T_to.mean);
   copy_matrix(closure.from_T_to.covariance, wire.covariance);
   wire.log10_false_alarm = closure.log10_false_alarm;

@@ -48,6 +48,10 @@ void export_as(const std::string& format, const SlamResults& results,
     write(out / "live.tum", to_tum(live_trajectory(results)));
     write(out / "keyframes.tum", to_tum(keyframe_trajectory(map)));
     if (!results.truth.empty()) write(out / "truth.tum", to_tum(results.truth));
+  } else if (format == "kitti") {
+    const PairedTrajectories paired = paired_trajectories(results);
+    write(out / "live.kitti", to_kitti(paired.live));
+    if (!paired.truth.empty()) write(out / "truth.kitti", to_kitti(paired.truth));
   } else if (format == "csv") {
     write(out / "landmarks.csv", landmarks_csv(map, results.existence));
     write(out / "keyframes.csv", keyframes_csv(map));
@@ -121,9 +125,9 @@ void add_export_command(CLI::App& parent) {
       ->required();
   command
       ->add_option("--format", options->formats,
-                   "tum, csv, g2o: results; mcap: all messages, for Foxglove and Lichtblick")
+                   "tum, kitti, csv, g2o: results; mcap: all messages, for Foxglove and Lichtblick")
       ->delimiter(',')
-      ->check(CLI::IsMember({"tum", "csv", "g2o", "mcap"}))
+      ->check(CLI::IsMember({"tum", "kitti", "csv", "g2o", "mcap"}))
       ->capture_default_str();
   command->callback([options] { run(*options); });
 }

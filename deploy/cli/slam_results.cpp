@@ -5,8 +5,10 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "common/wire/convert.hpp"
+#include "deploy/cli/truth_track.hpp"
 #include "understory/ground_truth_t.hpp"
 
 namespace understory::cli {
@@ -89,6 +91,33 @@ std::string to_tum(const std::vector<std::pair<model::Utime, geometry::SE2>>& po
                    std::sin(0.5 * pose.theta()), std::cos(0.5 * pose.theta()));
   }
   return out;
+}
+
+std::string to_kitti(const std::vector<std::pair<model::Utime, geometry::SE2>>& poses) {
+  std::string out;
+  for (const auto& [utime, pose] : poses) {
+    const double cosine = std::cos(pose.theta());
+    const double sine = std::sin(pose.theta());
+    fmt::format_to(std::back_inserter(out),
+                   "{:.12g} {:.12g} 0 {:.9g} {:.12g} {:.12g} 0 {:.9g} 0 0 1 0\n", cosine, -sine,
+                   pose.x(), sine, cosine, pose.y());
+  }
+  return out;
+}
+
+PairedTrajectories paired_trajectories(const SlamResults& results) {
+  PairedTrajectories paired{live_trajectory(results), {}};
+  if (results.truth.empty()) return paired;
+  TruthTrack track;
+  for (const auto& [utime, pose] : results.truth) track.add(utime, pose);
+
+  for (const auto& one : std::exchange(paired.live, {})) {
+    const auto there = track.at(one.first);
+    if (!there) continue;
+    paired.live.push_back(one);
+    paired.truth.emplace_back(one.first, *there);
+  }
+  return paired;
 }
 
 std::vector<std::pair<model::Utime, geometry::SE2>> live_trajectory(const SlamResults& results) {

@@ -32,6 +32,18 @@ struct SlamResults {
 
 /// "time x y z qx qy qz qw", one pose a line [s, m]: what evo and the TUM tools read.
 std::string to_tum(const std::vector<std::pair<model::Utime, geometry::SE2>>& poses);
+/// The three rows of each pose's 4 x 4 matrix on one line [m]: what evo and the KITTI tools read.
+/// No times; axes as the vehicle has them (x forward, y left, z up), where KITTI's own are a
+/// camera's.
+std::string to_kitti(const std::vector<std::pair<model::Utime, geometry::SE2>>& poses);
+/// Live poses whose true pose the log has, and these true poses, in the same order: KITTI's format
+/// pairs lines. All live poses and no true ones where the log has no truth.
+struct PairedTrajectories {
+  std::vector<std::pair<model::Utime, geometry::SE2>> live;
+  std::vector<std::pair<model::Utime, geometry::SE2>> truth;
+};
+/// Cost: O(n log n).
+PairedTrajectories paired_trajectories(const SlamResults& results);
 /// map_T_vehicle as published live, by stamp.
 std::vector<std::pair<model::Utime, geometry::SE2>> live_trajectory(const SlamResults& results);
 /// map_T_base of the map's keyframes, by stamp.

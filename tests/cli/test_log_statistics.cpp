@@ -57,3 +57,28 @@ TEST_CASE("a trajectory for other tools has seconds, metres and a quaternion", "
   CHECK(to_tum({{1'700'000'000'250'000, geometry::SE2(1.5, -2.25, 0.0)}, {1, {}}}) ==
         "1700000000.250000 1.5 -2.25 0 0 0 0 1\n0.000001 0 0 0 0 0 0 1\n");
 }
+
+TEST_CASE("KITTI's format pairs a live pose with the true pose of its time", "[cli]") {
+  CHECK(to_kitti({{7, geometry::SE2(1.5, -2.25, 0.0)}}) == "1 -0 0 1.5 0 1 0 -2.25 0 0 1 0\n");
+
+  SlamResults results;
+  for (model::Utime utime = 0; utime < 10; ++utime) {
+    model::SlamPose pose;
+    pose.utime = 100'000 * utime;
+    pose.submap_T_vehicle = {0.1 * static_cast<double>(utime), 0.0, 0.0};
+    results.poses.push_back(pose);
+  }
+  CHECK(paired_trajectories(results).live.size() == 10);
+  CHECK(paired_trajectories(results).truth.empty());
+
+  // The truth begins after the third pose, at other times.
+  for (model::Utime utime = 250'000; utime < 2'000'000; utime += 100'000)
+    results.truth.emplace_back(utime, geometry::SE2(1e-6 * static_cast<double>(utime), 0.0, 0.0));
+  const PairedTrajectories paired = paired_trajectories(results);
+  REQUIRE(paired.live.size() == 7);
+  REQUIRE(paired.truth.size() == 7);
+  for (std::size_t i = 0; i < 7; ++i) {
+    CHECK(paired.live[i].first == paired.truth[i].first);
+    CHECK(paired.live[i].second.x() == Approx(paired.truth[i].second.x()));
+  }
+}

@@ -120,7 +120,7 @@ TEST_CASE("whatever passes the checks of the wire agrees with its schema") {
            {"GNSS", "gnss_t"},
            {"LOG", "log_t"},
            {"HEALTH", "health_t"},
-           {"LOOP_CLOSURE", "loop_closure_t"},
+           {"LOOP_CLOSURE", "loop_closure2_t"},
            {"LOOP_RESULT", "loop_result_t"},
            {"IMU", "imu_t"}}) {
     for (int i = 0; i < 300; ++i) {

@@ -42,6 +42,7 @@ constexpr Pin kPins[] = {
     {"lidar_scan_t", 0x2f0525fc9599a15bULL},
     {"lidar_sweep_t", 0xc6e641bff98690ebULL},
     {"log_t", 0xca8d03aba370c85aULL},
+    {"loop_closure2_t", 0x860481c6350d5f67ULL},
     {"loop_closure_t", 0x9b2815d3e69be4dfULL},
     {"loop_end_t", 0x0293fc57645ad425ULL},
     {"loop_result_t", 0x1f008682c3a71430ULL},

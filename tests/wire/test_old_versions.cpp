@@ -104,6 +104,22 @@ slam_update_t old_version(const slam_update3_t& wire) {
   return old;
 }
 
+loop_closure_t old_version(const loop_closure2_t& wire) {
+  loop_closure_t old{};
+  old.utime = wire.utime;
+  old.seq = wire.seq;
+  old.map_id = wire.map_id;
+  old.closure_id = wire.closure_id;
+  old.source = wire.source;
+  old.revoked = wire.revoked;
+  old.from = wire.from_end;
+  old.to = wire.to_end;
+  old.from_T_to = wire.from_T_to;
+  std::ranges::copy(std::span(&wire.covariance[0][0], 9), &old.covariance[0][0]);
+  old.log10_false_alarm = wire.log10_false_alarm;
+  return old;
+}
+
 }  // namespace
 
 TEST_CASE("odometry of the version before is read, without the level's error") {
@@ -176,5 +192,27 @@ TEST_CASE("keyframes, updates and poses of the versions before are read, as far 
         decode_message<model::MapUpdate>(encode_bytes(version_2(to_wire(with_sights))));
     REQUIRE(version_2_update);
     CHECK(encode_message(*version_2_update) == encode_message(update));
+  }
+}
+
+TEST_CASE("loop closures of the version before are read") {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Maker make(seed);
+    model::LoopClosure closure;
+    closure.utime = 40;
+    closure.sequence = seed;
+    closure.map_id = 3;
+    closure.id = 12;
+    closure.source = "manual";
+    closure.is_revoked = seed % 5 == 0;
+    closure.from = {3, 0};
+    closure.to = {0, 812};
+    closure.from_T_to = {make.pose(), make.covariance<3>() + Eigen::Matrix3d::Identity()};
+    closure.log10_false_alarm = -7.0;
+
+    const auto should = decode_message<model::LoopClosure>(encode_message(closure));
+    const auto is = decode_message<model::LoopClosure>(encode_bytes(old_version(to_wire(closure))));
+    REQUIRE(is);
+    CHECK(encode_message(*is) == encode_message(*should));
   }
 }

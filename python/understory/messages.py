@@ -1,0 +1,32 @@
+"""Messages by the types of understory: which class reads some bytes.
+
+The types themselves come from lcm-gen and stand in this package: `understory.slam_pose2_t` and so on.
+"""
+
+import understory
+
+_FINGERPRINT_BYTES = 8
+
+
+def _types():
+    found = {}
+    for name in dir(understory):
+        one = getattr(understory, name)
+        if name.endswith("_t") and hasattr(one, "_get_packed_fingerprint"):
+            found[one._get_packed_fingerprint()] = one
+    return found
+
+
+_BY_FINGERPRINT = _types()
+
+
+def decode(data):
+    """The message in these bytes, by the fingerprint at their start; None where no type of understory
+    has it. Raises ValueError where the type is known and the bytes are damaged."""
+    message_type = _BY_FINGERPRINT.get(bytes(data[:_FINGERPRINT_BYTES]))
+    if message_type is None:
+        return None
+    try:
+        return message_type.decode(bytes(data))
+    except Exception as error:  # lcm-gen's decoders raise whatever struct and UTF-8 do
+        raise ValueError(f"damaged {message_type.__name__}: {error}") from error
