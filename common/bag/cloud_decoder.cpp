@@ -42,6 +42,8 @@ constexpr double kRelative_s = 5.0;
 constexpr std::uint32_t kMostRings = 256;
 /// A reading at the end of the range may lie so much behind it.
 constexpr double kNoise = 1.01;
+/// Times in coarser steps than this share of the sweep are none.
+constexpr double kFinestShare = 0.01;
 
 /// Unit [s] of times that lie `spread` apart: nanoseconds of integers, seconds of floats, unless a
 /// sweep cannot last so long and another unit gives it a possible length.
@@ -70,12 +72,25 @@ struct CloudDecoder::RawPoint {
   double intensity = 0.0;
 };
 
+/// Where a point's ring is.
+enum class CloudDecoder::RingPlace : std::uint8_t { kNone, kField, kRow, kColumn };
+
 /// Which fields are which.
 struct CloudDecoder::Layout {
   FieldReader x, y, z;
   std::optional<FieldReader> time, ring, intensity;
   CloudRows rows;
-  bool has_ring_rows = false;  ///< The row of an organised cloud is the ring.
+  RingPlace ring_place = RingPlace::kNone;
+
+  std::uint32_t ring_at(const std::uint8_t* point, std::uint32_t row, std::uint32_t column) const {
+    if (ring_place == RingPlace::kRow) return row;
+    if (ring_place == RingPlace::kColumn) return column;
+    if (ring_place == RingPlace::kNone) return 0;
+    const double number = ring->value(point);
+    if (!(number >= 0.0 && number < kMostRings))
+      throw io::DataError(fmt::format("ring {} of {} at most", number, kMostRings - 1));
+    return static_cast<std::uint32_t>(number);
+  }
 };
 
 CloudDecoder::Layout CloudDecoder::layout_of(const PointCloud& cloud) const {
@@ -84,11 +99,18 @@ CloudDecoder::Layout CloudDecoder::layout_of(const PointCloud& cloud) const {
     if (!field) throw io::DataError(fmt::format("a cloud without the field {}", name));
     return *field;
   };
-  Layout layout{one("x"), one("y"), one("z"), {}, {}, {}, rows_of(cloud), false};
+  Layout layout{one("x"), one("y"), one("z"), {}, {}, {}, rows_of(cloud), RingPlace::kNone};
   layout.time = find_field(cloud, kTimeNames);
   layout.ring = find_field(cloud, kRingNames);
   layout.intensity = find_field(cloud, kIntensityNames);
-  layout.has_ring_rows = !layout.ring && cloud.height > 1 && cloud.height <= kMostRings;
+  // Of an organised cloud one dimension is the sensor's beams: there are fewer of them than of
+  // firings. Ouster has a beam in each row, RoboSense in each column.
+  const std::uint32_t fewer = std::min(cloud.height, cloud.width);
+  if (layout.ring) {
+    layout.ring_place = RingPlace::kField;
+  } else if (fewer > 1 && fewer <= kMostRings) {
+    layout.ring_place = fewer == cloud.height ? RingPlace::kRow : RingPlace::kColumn;
+  }
   return layout;
 }
 
@@ -110,32 +132,31 @@ model::PointSweep CloudDecoder::decode(const PointCloud& cloud) {
         point.ticks = layout.time->integer(at);
         if (!std::isfinite(point.time)) continue;
       }
-      if (layout.ring) {
-        const double ring = layout.ring->value(at);
-        if (!(ring >= 0.0 && ring < kMostRings))
-          throw io::DataError(fmt::format("ring {} is above {}", ring, kMostRings - 1));
-        point.ring = static_cast<std::uint32_t>(ring);
-      } else if (layout.has_ring_rows) {
-        point.ring = row;
-      }
+      point.ring = layout.ring_at(at, row, column);
       if (layout.intensity) point.intensity = layout.intensity->value(at);
       points.push_back(point);
     }
   }
 
-  if (layout.has_ring_rows) rings_ = std::max(rings_, layout.rows.rows);
+  if (layout.ring_place == RingPlace::kRow) rings_ = std::max(rings_, layout.rows.rows);
+  if (layout.ring_place == RingPlace::kColumn) rings_ = std::max(rings_, layout.rows.columns);
   if (layout.time) {
     decide_time(points, cloud.header.stamp_ns, layout.time->type());
     time_text_ = time_text(*layout.time);
   }
   if (layout.intensity) decide_intensity(points, layout.intensity->is_integer());
-  const bool has_rings = layout.ring || layout.has_ring_rows;
-  ring_text_ = layout.ring ? std::string(layout.ring->name()) : has_rings ? "rows" : "none";
-  return sweep_of(std::move(points), cloud.header, layout.time.has_value(), has_rings);
+  ring_text_ = layout.ring_place == RingPlace::kField    ? std::string(layout.ring->name())
+               : layout.ring_place == RingPlace::kRow    ? "rows"
+               : layout.ring_place == RingPlace::kColumn ? "columns"
+                                                         : "none";
+  return sweep_of(std::move(points), cloud.header, layout.time.has_value(),
+                  layout.ring_place != RingPlace::kNone);
 }
 
 std::string CloudDecoder::time_text(const FieldReader& field) const {
-  if (!unit_s_) return fmt::format("none ({} is always the same)", field.name());
+  if (!unit_s_)
+    return fmt::format("none ({} is {})", field.name(),
+                       is_too_coarse_ ? "a float32 too coarse for its values" : "always the same");
   const std::string_view from = is_own_clock_
                                     ? "of a clock of its own: the first point is at the stamp"
                                 : is_absolute_ ? "of the stamp's clock"
@@ -166,6 +187,12 @@ void CloudDecoder::decide_time(const std::vector<RawPoint>& points, std::int64_t
   const auto [first, last] = std::ranges::minmax(points, {}, &RawPoint::time);
   const double spread = last.time - first.time;
   if (spread <= 0.0) return;
+  // Seconds since 1970 do not fit into a float: what it holds are steps of two minutes.
+  constexpr std::uint8_t kFloat32 = 7;
+  constexpr double kRelativeStep = 1.2e-7;
+  const double step = kRelativeStep * std::max(std::abs(first.time), std::abs(last.time));
+  is_too_coarse_ = type == kFloat32 && step > kFinestShare * spread;
+  if (is_too_coarse_) return;
 
   unit_s_ = options_.time_unit_s ? *options_.time_unit_s : time_unit(spread, type);
   const double middle_s = 0.5 * (first.time + last.time) * *unit_s_;

@@ -45,6 +45,7 @@ class CloudDecoder {
  private:
   /// How the rings of the sensor are counted.
   enum class RingOrder : std::uint8_t { kUnknown, kUpwards, kDownwards, kTable };
+  enum class RingPlace : std::uint8_t;
   struct RawPoint;
   struct Layout;
 
@@ -65,6 +66,7 @@ class CloudDecoder {
   std::optional<double> unit_s_;  ///< Of the points' times, once decided.
   bool is_absolute_ = false;      ///< Times are those of a clock, not from the stamp.
   bool is_own_clock_ = false;     ///< Which is not the stamp's.
+  bool is_too_coarse_ = false;    ///< The field's type cannot hold times of points.
   RingOrder ring_order_ = RingOrder::kUnknown;
   std::uint32_t rings_ = 0;                 ///< Number of beams, as far as known.
   std::vector<std::uint16_t> ring_table_;   ///< By the sensor's number.

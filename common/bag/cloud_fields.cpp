@@ -16,6 +16,8 @@ constexpr std::array<std::size_t, 9> kTypeBytes{0, 1, 1, 2, 2, 4, 4, 4, 8};
 constexpr std::array<std::string_view, 9> kTypeNames{
     "?", "int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"};
 
+constexpr std::uint64_t kMostPoints = 20'000'000;
+
 template <class T>
 T number_from(const std::uint8_t* at, bool is_big_endian) {
   std::array<std::uint8_t, sizeof(T)> bytes{};
@@ -82,6 +84,9 @@ CloudRows rows_of(const PointCloud& cloud) {
   CloudRows rows{cloud.height, cloud.width, cloud.row_step, cloud.point_step};
   if (rows.points() == 0) return {};
   if (cloud.point_step == 0) throw io::DataError("a cloud whose points have no bytes");
+  if (rows.points() > kMostPoints)
+    throw io::DataError(
+        fmt::format("{} points, more than the {} that are read", rows.points(), kMostPoints));
   const std::uint64_t least = std::uint64_t{cloud.width} * cloud.point_step;
   if (rows.rows == 1 || rows.row_bytes < least) rows.row_bytes = least;
 

@@ -4,9 +4,12 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
+#include <span>
 
 #include "common/io/data_error.hpp"
+#include "common/io/file_window.hpp"
 
 namespace understory::bag {
 namespace {
@@ -35,12 +38,37 @@ std::string uri_of(const std::filesystem::path& path) {
   return uri + (none || log == 0 ? "?immutable=1" : "?mode=ro");
 }
 
+std::uint32_t big_endian(std::span<const std::uint8_t> bytes) {
+  std::uint32_t value = 0;
+  for (const std::uint8_t byte : bytes) value = value << 8U | byte;
+  return value;
+}
+
+/// SQLite reads zeros behind the end of a file that is cut off within a page. Its header tells how
+/// many pages there were (https://sqlite.org/fileformat.html, 1.3).
+void refuse_cut_off(const std::filesystem::path& path) {
+  io::FileWindow file(path);
+  std::array<std::uint8_t, 100> header{};
+  if (!file.read(0, header)) throw io::DataError(path.string() + ": cut off within its header");
+  const std::span<const std::uint8_t> bytes(header);
+  const std::uint32_t stated = big_endian(bytes.subspan(16, 2));
+  const std::uint64_t page = stated == 1 ? 65536 : stated;
+  const bool is_count_valid = std::ranges::equal(bytes.subspan(24, 4), bytes.subspan(92, 4));
+  const std::uint64_t pages = is_count_valid ? big_endian(bytes.subspan(28, 4)) : 0;
+  if (page == 0 || (file.size() % page == 0 && file.size() >= page * pages)) return;
+  throw io::DataError(
+      fmt::format("{0}: cut off at byte {1}: 'sqlite3 {0} .recover | sqlite3 NEW.db3' "
+                  "saves what is left",
+                  path.string(), file.size()));
+}
+
 }  // namespace
 
 /// The open file and the statements on it.
 class SqliteBag::Database {
  public:
   explicit Database(const std::filesystem::path& path) : source_(path.string()) {
+    refuse_cut_off(path);
     const int flags = SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX;
     sqlite3* raw = nullptr;
     const int result = sqlite3_open_v2(uri_of(path).c_str(), &raw, flags, nullptr);

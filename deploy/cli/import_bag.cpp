@@ -118,7 +118,7 @@ void import_chosen(const BagImportOptions& options, bag::Bag& bag, const bag::Su
   BagLog log(options.out);
   BagMessages messages(bag, survey, choice, mounts, conversion, log);
   read_all(bag, choice, messages);
-  const BagFindings findings{messages.has_times(), conversion.wheelbase_m};
+  const BagFindings findings{messages.has_times(), messages.has_rings(), conversion.wheelbase_m};
   const std::string settings = bag_settings(bag, survey, choice, mounts, findings, remarks);
   log.commit();
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/io/lcm_log.hpp"
@@ -24,8 +25,8 @@ class BagLog {
   template <class Message>
   void add(const std::string& channel, Message message, model::Utime due) {
     set_number(message, counts_[channel]++);
-    waiting_.emplace(due, Event{channel, wire::encode_message(message)});
-    write_until(waiting_.rbegin()->first - kWindow_us);
+    waiting_.emplace(Key{due, rank_of(channel)}, Event{channel, wire::encode_message(message)});
+    write_until(waiting_.rbegin()->first.first - kWindow_us);
   }
   /// A sweep, in parts, complete with its last point.
   void add_sweep(const model::PointSweep& sweep) {
@@ -57,6 +58,16 @@ class BagLog {
     std::string channel;
     wire::Bytes bytes;
   };
+  using Key = std::pair<model::Utime, int>;  ///< When it is complete, rank_of().
+
+  /// Of one stamp motion comes first, so that whoever takes a sweep has the motion up to it; and
+  /// the log does not depend on the order in which a recorder got them.
+  static int rank_of(const std::string& channel) {
+    if (channel == "RAW_IMU") return 0;
+    if (channel == "RAW_WHEELS") return 1;
+    if (channel == "RAW_GNSS") return 2;
+    return channel == "GROUND_TRUTH" ? 3 : 4;
+  }
 
   template <class Message>
   static void set_number(Message& message, std::uint64_t number) {
@@ -67,18 +78,18 @@ class BagLog {
     }
   }
   void write_until(model::Utime utime) {
-    while (!waiting_.empty() && waiting_.begin()->first <= utime) write_first();
+    while (!waiting_.empty() && waiting_.begin()->first.first <= utime) write_first();
   }
   void write_first() {
     const auto first = waiting_.begin();
-    if (first->first < latest_) ++late_;
-    latest_ = std::max(latest_, first->first);
+    if (first->first.first < latest_) ++late_;
+    latest_ = std::max(latest_, first->first.first);
     writer_.write(latest_, first->second.channel, first->second.bytes);
     waiting_.erase(first);
   }
 
   io::LcmLogWriter writer_;
-  std::multimap<model::Utime, Event> waiting_;
+  std::multimap<Key, Event> waiting_;
   std::map<std::string, std::uint64_t> counts_;
   std::uint64_t sweeps_ = 0;
   std::uint64_t late_ = 0;

@@ -102,6 +102,7 @@ void BagMessages::add_sweep(model::PointSweep sweep) {
   }
   if (sweep.utime < 0) throw io::DataError("a stamp before 1970");
   has_times_ = sweep.has_times;
+  has_rings_ = sweep.rings > 0;
   log_.add_sweep(sweep);
 }
 

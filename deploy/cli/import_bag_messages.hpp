@@ -41,6 +41,8 @@ class BagMessages {
   void finish();
   /// Whether the sweeps had times of points.
   bool has_times() const { return has_times_; }
+  /// Whether they had rings.
+  bool has_rings() const { return has_rings_; }
   /// How the cloud was read; empty without a cloud.
   std::string cloud_text() const;
   /// What could not be used: one line each.
@@ -70,6 +72,7 @@ class BagMessages {
   bag::CloudDecoder decoder_;
   std::unique_ptr<Velodyne> velodyne_;
   bool has_times_ = true;
+  bool has_rings_ = true;
   std::uint64_t empty_clouds_ = 0;
   std::optional<io::LocalPlane> plane_;
   std::uint64_t without_fix_ = 0;

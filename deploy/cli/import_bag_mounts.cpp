@@ -121,6 +121,9 @@ std::string bag_settings(const bag::Bag& bag, const bag::Survey& survey, const B
                       "(clockwise; state it otherwise in the settings)",
                       bag.topics()[*choice.cloud].name));
     }
+    if (!findings.has_rings)
+      remarks.push_back(fmt::format("{} has no rings: trunks and corners are not found in it",
+                                    bag.topics()[*choice.cloud].name));
     text += mount_of("lidar.mount", frame(*choice.cloud), mounts, remarks);
   }
 

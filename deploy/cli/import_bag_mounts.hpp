@@ -36,6 +36,7 @@ class BagMounts {
 /// What the import found and used.
 struct BagFindings {
   bool has_times = true;     ///< The cloud's points have times.
+  bool has_rings = true;     ///< The cloud's points have rings.
   double wheelbase_m = 2.7;  ///< With which RAW_WHEELS has steering.
 };
 
