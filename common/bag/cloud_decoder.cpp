@@ -333,9 +333,11 @@ model::PointSweep CloudDecoder::sweep_of(std::vector<RawPoint> points, const Hea
 
   set_times(points, header, sweep);
   sweep.rings = static_cast<std::uint16_t>(rings_);
-  std::ranges::stable_sort(sweep.points, [](const auto& a, const auto& b) {
-    return std::pair(a.time_s, a.ring) < std::pair(b.time_s, b.ring);
-  });
+  const auto is_before = [](const model::SweepPoint& a, const model::SweepPoint& b) {
+    return a.time_s < b.time_s || (a.time_s == b.time_s && a.ring < b.ring);
+  };
+  if (!std::ranges::is_sorted(sweep.points, is_before))
+    std::ranges::stable_sort(sweep.points, is_before);
   return sweep;
 }
 

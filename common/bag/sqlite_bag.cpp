@@ -105,13 +105,16 @@ class SqliteBag::Database {
     throw io::DataError(fmt::format("{}: {}", source_, sqlite3_errmsg(file_.get())));
   }
 
-  Statement order{nullptr, sqlite3_finalize};    ///< Ids of messages in order of time.
-  Statement message{nullptr, sqlite3_finalize};  ///< One message by its id.
-  std::map<std::int64_t, std::size_t> wanted;    ///< Places in topics_ by id in the file.
+  std::map<std::int64_t, std::size_t> wanted;  ///< Places in topics_ by id in the file.
 
  private:
   std::string source_;
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> file_{nullptr, sqlite3_close};
+
+ public:
+  // Behind the file: they end before it is closed.
+  Statement order{nullptr, sqlite3_finalize};    ///< Ids of messages in order of time.
+  Statement message{nullptr, sqlite3_finalize};  ///< One message by its id.
 };
 
 SqliteBag::SqliteBag(const std::filesystem::path& path)
