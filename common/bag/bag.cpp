@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <limits>
 
 #include "common/bag/joined_bag.hpp"
 #include "common/bag/mcap_file.hpp"
@@ -84,6 +85,7 @@ std::unique_ptr<Bag> open_bag(const std::filesystem::path& path) {
   const std::vector<std::filesystem::path> files = files_of(path);
   if (files.size() == 1) return open_file(files.front());
   std::vector<std::unique_ptr<Bag>> parts;
+  parts.reserve(files.size());
   for (const auto& file : files) parts.push_back(open_file(file));
   return std::make_unique<JoinedBag>(std::move(parts), path.string());
 }
@@ -92,6 +94,11 @@ std::string plain_type(std::string_view type) {
   std::string plain(type);
   if (const auto msg = plain.find("/msg/"); msg != std::string::npos) plain.erase(msg, 4);
   return plain;
+}
+
+std::int64_t bounded_time(std::int64_t time_ns) {
+  constexpr std::int64_t kMost_ns = std::numeric_limits<std::int64_t>::max() / 2;
+  return std::clamp(time_ns, -kMost_ns, kMost_ns);
 }
 
 Encoding encoding_of(std::string_view name) {

@@ -71,6 +71,10 @@ std::string plain_type(std::string_view type);
 /// By the name that MCAP and SQLite bags give: "ros1", "cdr"; another is kOther.
 Encoding encoding_of(std::string_view name);
 
+/// A time within 146 years of 1970: what is beyond is damage, and becomes the limit. Differences of
+/// such times and of stamps fit into 64 bits.
+std::int64_t bounded_time(std::int64_t time_ns);
+
 constexpr std::size_t kMostUnpackedBytes = 256U << 20U;
 
 }  // namespace understory::bag

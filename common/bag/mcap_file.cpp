@@ -21,6 +21,10 @@ constexpr std::uint64_t kRunBytes = 4U << 20U;
 
 bool is(std::uint8_t opcode, Opcode wanted) { return opcode == static_cast<std::uint8_t>(wanted); }
 
+std::int64_t read_time(ByteReader& reader) {
+  return bounded_time(static_cast<std::int64_t>(reader.number<std::uint64_t>()));
+}
+
 /// A channel with the name of its type.
 ChannelInfo channel_of(ByteReader& content, const std::map<std::uint16_t, std::string>& types) {
   const auto schema = content.number<std::uint16_t>();
@@ -119,8 +123,8 @@ void McapFile::take_chunk(std::uint64_t offset, std::uint64_t bytes, std::uint64
       content_at(offset, std::min(bytes, kHead + 4 + kLongestName + 8));
   ByteReader reader(head);
   ChunkPlace place;
-  place.span.start_ns = static_cast<std::int64_t>(reader.number<std::uint64_t>());
-  place.span.end_ns = static_cast<std::int64_t>(reader.number<std::uint64_t>());
+  place.span.start_ns = read_time(reader);
+  place.span.end_ns = read_time(reader);
   place.unpacked_bytes = reader.number<std::uint64_t>();
   place.crc = reader.number<std::uint32_t>();
   place.packing = reader.text();
@@ -165,7 +169,7 @@ void McapFile::take_message(std::uint64_t offset, std::uint64_t bytes) {
   ByteReader reader(head);
   const auto id = reader.number<std::uint16_t>();
   reader.take(4);
-  const auto time = static_cast<std::int64_t>(reader.number<std::uint64_t>());
+  const auto time = read_time(reader);
 
   const std::uint64_t begin = offset - mcap::kRecordHead;
   if (places_.empty() || run_end_ != begin || places_.back().bytes > kRunBytes) {
@@ -195,7 +199,7 @@ void McapFile::read_records(Bytes records, ChunkContent& content) const {
     if (is(opcode, Opcode::kMessage)) {
       const auto id = record.number<std::uint16_t>();
       record.take(4);
-      const auto time = static_cast<std::int64_t>(record.number<std::uint64_t>());
+      const auto time = read_time(record);
       record.take(8);
       content.entries.push_back({time, id, static_cast<std::uint32_t>(begin + record.at()),
                                  static_cast<std::uint32_t>(record.left())});

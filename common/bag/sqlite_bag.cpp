@@ -187,7 +187,7 @@ std::optional<Message> SqliteBag::next() {
     } else {
       data_.assign(bytes, bytes + size);
     }
-    return Message{topic->second, sqlite3_column_int64(message, 1), data_};
+    return Message{topic->second, bounded_time(sqlite3_column_int64(message, 1)), data_};
   }
   return std::nullopt;
 }

@@ -57,7 +57,8 @@ void print_span(const bag::Survey& survey) {
     last = std::max(last, topic.last_ns);
   }
   if (last == 0) return;
-  fmt::print(", {:.1f} s from {:%Y-%m-%d %H:%M:%S} UTC", 1e-9 * static_cast<double>(last - first),
+  fmt::print(", {:.1f} s from {:%Y-%m-%d %H:%M:%S} UTC",
+             1e-9 * (static_cast<double>(last) - static_cast<double>(first)),
              fmt::gmtime(static_cast<std::time_t>(first / 1'000'000'000)));
 }
 

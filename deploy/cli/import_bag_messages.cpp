@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/io/data_error.hpp"
 #include "common/io/text_file.hpp"
@@ -85,8 +87,9 @@ void BagMessages::convert(const bag::Message& message) {
 /// To be added to the topic's stamps.
 std::int64_t BagMessages::shift_ns(std::size_t topic) const {
   if (!conversion_.by_reception.contains(topic)) return 0;
-  return -static_cast<std::int64_t>(
-      std::llround(1e9 * survey_.topics[topic].stamp_minus_received_s));
+  constexpr double kMost_ns = 4e18;
+  const double shift = -1e9 * survey_.topics[topic].stamp_minus_received_s;
+  return std::llround(std::clamp(shift, -kMost_ns, kMost_ns));
 }
 
 model::Utime BagMessages::utime_of(const bag::Header& header, std::size_t topic) const {

@@ -1,5 +1,6 @@
 // Damaged bags give an error that names the file, or what is before the damage.
 #include <algorithm>
+#include <limits>
 #include <random>
 
 #include "common/bag/bag.hpp"
@@ -150,6 +151,22 @@ TEST_CASE("bag damage: changed bytes give an error or messages, never a crash") 
     // MCAP has checksums: most changes inside of chunks are noticed.
     CAPTURE(form.name(), errors);
     if (form.kind == BagForm::Kind::kMcap && form.has_chunks) CHECK(errors > 60);
+  }
+}
+
+TEST_CASE("bag damage: times that no clock has") {
+  const Scratch scratch("bag-times");
+  Random random(5);
+  for (const auto kind : {BagForm::Kind::kMcap, BagForm::Kind::kSqlite}) {
+    const BagForm form{kind};
+    auto messages = drive(random, form.encoding());
+    messages[3].time_ns = std::numeric_limits<std::int64_t>::min();
+    messages[9].time_ns = std::numeric_limits<std::int64_t>::max();
+    messages[10].time_ns = -1;
+    write_bag(scratch.path() / form.file(), form, messages);
+    std::size_t errors = 0;
+    CHECK(read_damaged(scratch.path() / form.file(), errors).size() == messages.size());
+    CHECK(errors == 0);
   }
 }
 
