@@ -9,6 +9,7 @@ namespace understory::bag {
 namespace {
 
 constexpr std::uint64_t kCloudsLookedInto = 3;
+constexpr std::uint64_t kForcesLookedAt = 100;
 /// Differences of clocks that are kept: of more messages every second one is dropped, and so on.
 constexpr std::size_t kMostDifferences = 4096;
 
@@ -63,6 +64,11 @@ void look_into(const Bag& bag, const Message& message, Survey& survey, TopicSurv
   const Header header = read_header(reader);
   if (found.messages == 1) found.frame = header.frame;
   gathered.differences.add(header.stamp_ns - message.received_ns);
+  if (role == Role::kImu && found.messages <= kForcesLookedAt) {
+    MessageReader again = reader_of(bag, message);
+    found.force_mps2 += (read_imu(again).specific_force_mps2 - found.force_mps2) /
+                        static_cast<double>(found.messages);
+  }
   if (role != Role::kCloud || found.messages > kCloudsLookedInto) return;
   look_into_cloud(reader_of(bag, message), topic.type, gathered.decoder);
   if (!topic.type.starts_with("velodyne_msgs")) found.cloud = gathered.decoder.description();

@@ -34,7 +34,9 @@ struct TopicSurvey {
   std::string frame;                    ///< Of the first header.
   double stamp_minus_received_s = 0.0;  ///< Median.
   std::string cloud;                    ///< CloudDecoder::description(), of clouds.
-  std::string fault;                    ///< Of the first message that cannot be read; empty = none.
+  /// Mean of an IMU's first 100 messages, in the unit that it has.
+  Eigen::Vector3d force_mps2 = Eigen::Vector3d::Zero();
+  std::string fault;  ///< Of the first message that cannot be read; empty = none.
 
   /// Messages per second; 0 where there are fewer than two.
   double rate_hz() const;

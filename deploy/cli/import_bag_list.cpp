@@ -62,6 +62,31 @@ void print_span(const bag::Survey& survey) {
              fmt::gmtime(static_cast<std::time_t>(first / 1'000'000'000)));
 }
 
+/// The force at the beginning, and what is odd about it: at rest it is gravity's, upwards.
+std::string force_text(const bag::TopicSurvey& imu, const BagMounts& mounts) {
+  constexpr double kGravity = 9.81;
+  const Eigen::Vector3d& force = imu.force_mps2;
+  std::string text = fmt::format("force at the beginning ({:.2f}, {:.2f}, {:.2f})", force.x(),
+                                 force.y(), force.z());
+  const double size = force.norm();
+  if (std::abs(size - 1.0) < 0.2) {
+    text += ": in g, which lidar_imu_input converts";
+  } else if (size < 0.5 * kGravity) {
+    text += " m/s^2: gravity is missing";
+  } else {
+    text += " m/s^2";
+  }
+
+  const auto mount = mounts.find(imu.frame);
+  if (mount && size > 0.5 && (mount->linear() * force).z() < -0.5 * size)
+    text +=
+        "; it points down in the vehicle: an IMU upside down, or a driver that turned its sign "
+        "round";
+  if (mount && size > 0.5 && std::abs((mount->linear() * force).z()) < 0.5 * size)
+    text += "; it points sideways in the vehicle: another mount than the transforms say";
+  return text;
+}
+
 void print_mounts(const bag::Bag& bag, const bag::Survey& survey, const BagMounts& mounts) {
   std::vector<std::string> frames;
   for (std::size_t i = 0; i < bag.topics().size(); ++i) {
@@ -132,6 +157,8 @@ void print_bag_list(const std::string& path, const bag::Bag& bag, const bag::Sur
     const bag::TopicSurvey& found = survey.topics[i];
     const std::string name = terminal::printable(bag.topics()[i].name);
     if (!found.cloud.empty()) fmt::print("{}: {}\n", name, terminal::printable(found.cloud));
+    if (role_of(bag.topics()[i]) == bag::Role::kImu && found.messages > 0)
+      fmt::print("{}: {}\n", name, force_text(found, mounts));
     if (!found.fault.empty()) fmt::print("{}: {}\n", name, terminal::printable(found.fault));
     if (uses[i].starts_with("RAW_")) sensors.push_back(i);
   }

@@ -1,4 +1,6 @@
 // What was recorded comes out of every container, in order of time.
+#include <sqlite3.h>
+
 #include <algorithm>
 #include <random>
 
@@ -132,8 +134,8 @@ TEST_CASE("bag: a topic in an encoding that is not read is listed") {
   }
 }
 
-TEST_CASE("bag: a recorder's write-ahead log is read, and the files stay as they are") {
-  const Scratch scratch("bag-wal");
+TEST_CASE("bag: an SQLite bag is read without a trace beside it") {
+  const Scratch scratch("bag-trace");
   std::mt19937_64 random(4);
   const BagForm form{BagForm::Kind::kSqlite};
   const auto messages = random_recording(random, 50);
@@ -143,6 +145,29 @@ TEST_CASE("bag: a recorder's write-ahead log is read, and the files stay as they
   check_same(read_all(*bag), in_order(messages));
   CHECK(file_bytes(scratch.path() / "run.db3") == before);
   CHECK(std::distance(std::filesystem::directory_iterator(scratch.path()), {}) == 1);
+}
+
+TEST_CASE("bag: the write-ahead log of a recorder that died is read, too") {
+  const Scratch scratch("bag-wal");
+  std::mt19937_64 random(6);
+  const auto messages = random_recording(random, 80);
+  const std::vector<Recorded> first(messages.begin(), messages.begin() + 40);
+  write_bag(scratch.path() / "live.db3", {BagForm::Kind::kSqlite}, first);
+  sqlite3* file = nullptr;
+  REQUIRE(sqlite3_open((scratch.path() / "live.db3").c_str(), &file) == SQLITE_OK);
+  const auto run = [&](const std::string& sql) {
+    REQUIRE(sqlite3_exec(file, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
+  };
+  run("PRAGMA journal_mode = WAL");
+  run("INSERT INTO messages(topic_id, timestamp, data) SELECT topic_id, timestamp + 1000, data "
+      "FROM messages");
+  // As the files were when it died.
+  for (const char* ending : {"", "-wal"})
+    std::filesystem::copy_file(scratch.path() / ("live.db3" + std::string(ending)),
+                               scratch.path() / ("died.db3" + std::string(ending)));
+  sqlite3_close(file);
+  const auto bag = bag::open_bag(scratch.path() / "died.db3");
+  CHECK(read_all(*bag).size() == 80);
 }
 
 TEST_CASE("bag: what is no bag is refused by name") {

@@ -1,4 +1,6 @@
 // Messages in ROS 1's serialisation and in CDR of both byte orders.
+#include <zstd.h>
+
 #include <functional>
 #include <random>
 
@@ -194,6 +196,18 @@ TEST_CASE("bag messages: lengths that cannot be, and CDR of other kinds, are ref
   bag::MessageReader of_second(second, bag::Encoding::kCdr);
   CHECK(of_second.number<std::uint32_t>() == 1);
   CHECK(of_second.number<double>() == 1.0);
+}
+
+TEST_CASE("bag messages: those that rosbag2 packed one by one are unpacked") {
+  const Serialisation how{bag::Encoding::kCdr, false};
+  const MessageBytes plain = imu_message(how, {{77, "imu"}, {1, 2, 3}, {4, 5, 6}});
+  MessageBytes packed(ZSTD_compressBound(plain.size()));
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), plain.data(), plain.size(), 3));
+  bag::MessageReader reader(packed, bag::Encoding::kCdr);
+  CHECK(read_imu(reader).specific_force_mps2 == Eigen::Vector3d(4, 5, 6));
+  packed.pop_back();
+  CHECK_THROWS_WITH(bag::MessageReader(packed, bag::Encoding::kCdr),
+                    Catch::Matchers::Contains("zstd"));
 }
 
 TEST_CASE("bag messages: static transforms join along any chain") {

@@ -304,6 +304,23 @@ TEST_CASE("import bag: clocks that differ are named and laid onto the recorder's
   folder.refused(bag, "--receive-time /none", "no such topic");
 }
 
+TEST_CASE("import bag --list: an IMU in g, upside down, tilted, without gravity", "[import]") {
+  const BagFolder folder;
+  const auto listed = [&](const Eigen::Vector3d& force) {
+    const MessageBytes message =
+        imu_message({bag::Encoding::kCdr, false}, {{kStart_ns, "base_link"}, {0, 0, 0}, force});
+    const std::string bag =
+        folder.write({BagForm::Kind::kMcap}, {{"/imu", "sensor_msgs/Imu", kStart_ns, message},
+                                              {"/imu", "sensor_msgs/Imu", kStart_ns + 1, message}});
+    return folder.import(bag, "--list").out;
+  };
+  CHECK_THAT(listed({0, 0, 9.8}), Contains("(0.00, 0.00, 9.80) m/s^2\n"));
+  CHECK_THAT(listed({0, 0, 1.0}), Contains("in g"));
+  CHECK_THAT(listed({0, 0, 0.1}), Contains("gravity is missing"));
+  CHECK_THAT(listed({0, 0, -9.8}), Contains("points down"));
+  CHECK_THAT(listed({9.8, 0, 0.3}), Contains("points sideways"));
+}
+
 TEST_CASE("import bag: odometry without a twist, and packets", "[import]") {
   const BagFolder folder;
   const Serialisation ros1{bag::Encoding::kRos1, false};
