@@ -67,6 +67,7 @@ std::vector<std::size_t> candidates(const Slot& slot, const std::vector<bag::Top
 
 std::string names(const std::vector<std::size_t>& list, const std::vector<bag::Topic>& topics) {
   std::vector<std::string> text;
+  text.reserve(list.size());
   for (const std::size_t i : list)
     text.push_back(fmt::format("{} ({}, {} messages)", topics[i].name, topics[i].type,
                                topics[i].messages.value_or(0)));
@@ -103,6 +104,16 @@ std::optional<std::size_t> choose(const Slot& slot, const std::string& name,
                                   names(list, topics), slot.option));
 }
 
+/// The same, but none of several.
+std::optional<std::size_t> choice_or_none(const Slot& slot, const std::string& name,
+                                          const std::vector<bag::Topic>& topics) {
+  try {
+    return choose(slot, name, topics);
+  } catch (const io::DataError&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 std::vector<std::size_t> BagChoice::all() const {
@@ -134,21 +145,16 @@ std::vector<std::string> bag_uses(const std::vector<bag::Topic>& topics, const B
   std::vector<std::string> uses(topics.size());
   std::optional<std::size_t> cloud;
   for (const Slot& slot : slots()) {
-    const auto list = candidates(slot, topics);
     const std::string& name = named.*slot.name;
-    std::optional<std::size_t> taken;
-    try {
-      if (!(slot.option == "scan" && name.empty() && cloud)) taken = choose(slot, name, topics);
-    } catch (const io::DataError&) {
-      // Several: each is told how it is chosen.
-    }
+    const bool is_beside_cloud = slot.option == "scan" && name.empty() && cloud;
+    const auto taken = is_beside_cloud ? std::nullopt : choice_or_none(slot, name, topics);
     if (slot.option == "cloud") cloud = taken;
 
-    for (const std::size_t i : list) {
-      const std::string use = taken == i ? std::string(slot.channel)
-                              : taken    ? ""
-                                         : fmt::format("--{} {}", slot.option, topics[i].name);
-      if (!use.empty()) uses[i] += (uses[i].empty() ? "" : " or ") + use;
+    for (const std::size_t i : candidates(slot, topics)) {
+      if (taken && taken != i) continue;
+      const std::string use =
+          taken ? std::string(slot.channel) : fmt::format("--{} {}", slot.option, topics[i].name);
+      uses[i] += (uses[i].empty() ? "" : " or ") + use;
     }
   }
 

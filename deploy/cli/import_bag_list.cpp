@@ -118,6 +118,7 @@ void print_mounts(const bag::Bag& bag, const bag::Survey& survey, const BagMount
 std::vector<std::string> clock_remarks(const bag::Bag& bag, const bag::Survey& survey,
                                        const std::vector<std::size_t>& chosen) {
   std::vector<double> offsets;
+  offsets.reserve(chosen.size());
   for (const std::size_t topic : chosen)
     offsets.push_back(survey.topics[topic].stamp_minus_received_s);
   if (offsets.empty()) return {};

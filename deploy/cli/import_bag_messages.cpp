@@ -98,7 +98,7 @@ model::Utime BagMessages::utime_of(const bag::Header& header, std::size_t topic)
   return stamp / 1000;
 }
 
-void BagMessages::add_sweep(model::PointSweep sweep) {
+void BagMessages::add_sweep(const model::PointSweep& sweep) {
   if (sweep.points.empty()) {
     ++empty_clouds_;
     return;
@@ -120,7 +120,7 @@ void BagMessages::take_cloud(const bag::Message& message) {
                                 : decoder_.decode(read_livox_cloud(reader));
   // The decoder compares times of points with the stamp as it is.
   sweep.utime += shift_ns(message.topic) / 1000;
-  add_sweep(std::move(sweep));
+  add_sweep(sweep);
 }
 
 void BagMessages::take_packets(const bag::VelodyneScan& scan, std::int64_t shift_ns) {
@@ -128,8 +128,9 @@ void BagMessages::take_packets(const bag::VelodyneScan& scan, std::int64_t shift
     if (!velodyne_)
       velodyne_ = std::make_unique<Velodyne>(
           Velodyne{io::VelodyneDecoder(calibration_for(conversion_, packet.bytes))});
-    if (auto sweep = velodyne_->decoder.add(packet.bytes, (packet.stamp_ns + shift_ns) / 1000))
-      add_sweep(std::move(*sweep));
+    if (const auto sweep =
+            velodyne_->decoder.add(packet.bytes, (packet.stamp_ns + shift_ns) / 1000))
+      add_sweep(*sweep);
   }
 }
 
@@ -216,7 +217,7 @@ void BagMessages::take_truth(const bag::Message& message) {
 
 void BagMessages::finish() {
   if (velodyne_) {
-    if (auto sweep = velodyne_->decoder.finish()) add_sweep(std::move(*sweep));
+    if (const auto sweep = velodyne_->decoder.finish()) add_sweep(*sweep);
   }
   if (choice_.odometry && !conversion_.has_speed_from_pose && fastest_mps_ == 0.0 &&
       farthest_m_ > kMoved_m)

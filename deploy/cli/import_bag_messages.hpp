@@ -53,7 +53,7 @@ class BagMessages {
   void convert(const bag::Message& message);
   void take_cloud(const bag::Message& message);
   void take_packets(const bag::VelodyneScan& scan, std::int64_t shift_ns);
-  void add_sweep(model::PointSweep sweep);
+  void add_sweep(const model::PointSweep& sweep);
   void take_scan(const bag::Message& message);
   void take_imu(const bag::Message& message);
   void take_odometry(const bag::Message& message);

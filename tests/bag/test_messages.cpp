@@ -112,7 +112,7 @@ TEST_CASE("bag messages: IMU, odometry, fix and poses come back") {
   }
 }
 
-TEST_CASE("bag messages: scans, transforms, Livox clouds and packets come back") {
+TEST_CASE("bag messages: scans and transforms come back") {
   Random random(2);
   for (int round = 0; round < 10; ++round) {
     for (const Serialisation& how : kSerialisations) {
@@ -147,6 +147,18 @@ TEST_CASE("bag messages: scans, transforms, Livox clouds and packets come back")
         CHECK(tf_found[i].pose.isApprox(transforms[i].pose, 1e-12));
       }
 
+      if (round > 0) continue;
+      check_cuts(how, scan_bytes, 4, [](auto& reader) { read_laser_scan(reader); });
+      check_cuts(how, tf_bytes, 0, [](auto& reader) { read_transforms(reader); });
+    }
+  }
+}
+
+TEST_CASE("bag messages: Livox clouds and packets come back") {
+  Random random(4);
+  for (int round = 0; round < 10; ++round) {
+    for (const Serialisation& how : kSerialisations) {
+      CAPTURE(round, static_cast<int>(how.encoding), how.is_big_endian);
       bag::LivoxCloud cloud{random_header(random), 12345, {}};
       for (std::uint32_t i = 0; i < 5; ++i)
         cloud.points.push_back(
@@ -164,7 +176,7 @@ TEST_CASE("bag messages: scans, transforms, Livox clouds and packets come back")
       }
 
       MessageWriter packets(how);
-      packets.header(header).number(std::uint32_t{2});
+      packets.header(random_header(random)).number(std::uint32_t{2});
       for (std::uint8_t i = 0; i < 2; ++i)
         packets.stamp(77 + i).raw(MessageBytes(io::kVelodyneDataBytes, i));
       bag::MessageReader packet_reader(packets.bytes(), how.encoding);
@@ -175,8 +187,6 @@ TEST_CASE("bag messages: scans, transforms, Livox clouds and packets come back")
       CHECK(packets_found.packets[1].bytes[1205] == 1);
 
       if (round > 0) continue;
-      check_cuts(how, scan_bytes, 4, [](auto& reader) { read_laser_scan(reader); });
-      check_cuts(how, tf_bytes, 0, [](auto& reader) { read_transforms(reader); });
       check_cuts(how, livox_bytes, 0, [](auto& reader) { read_livox_cloud(reader); });
       check_cuts(how, packets.bytes(), 0, [](auto& reader) { read_velodyne_scan(reader); });
     }
