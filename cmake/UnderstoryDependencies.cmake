@@ -70,8 +70,20 @@ add_library(understory_zstd INTERFACE)
 target_include_directories(understory_zstd INTERFACE "${ZSTD_INCLUDE_DIR}")
 target_link_libraries(understory_zstd INTERFACE "${ZSTD_LIBRARY}")
 
+find_path(LZ4_INCLUDE_DIR lz4frame.h REQUIRED)
+find_library(LZ4_LIBRARY lz4 REQUIRED)
+add_library(understory_lz4 INTERFACE)
+target_include_directories(understory_lz4 INTERFACE "${LZ4_INCLUDE_DIR}")
+target_link_libraries(understory_lz4 INTERFACE "${LZ4_LIBRARY}")
+
+find_path(BZ2_INCLUDE_DIR bzlib.h REQUIRED)
+find_library(BZ2_LIBRARY bz2 REQUIRED)
+add_library(understory_bz2 INTERFACE)
+target_include_directories(understory_bz2 INTERFACE "${BZ2_INCLUDE_DIR}")
+target_link_libraries(understory_bz2 INTERFACE "${BZ2_LIBRARY}")
+
 # Headers alone, for common/place_recognition's sources.
 find_path(NANOFLANN_INCLUDE_DIR nanoflann.hpp REQUIRED)
 
 install(TARGETS understory_lcm understory_cholmod understory_zip understory_lzf understory_pcap understory_sqlite
-        understory_crypto understory_zlib understory_zstd EXPORT understory)
+        understory_crypto understory_zlib understory_zstd understory_lz4 understory_bz2 EXPORT understory)

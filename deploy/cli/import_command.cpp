@@ -13,6 +13,7 @@
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/guarded_import.hpp"
+#include "deploy/cli/import_bag.hpp"
 #include "deploy/cli/import_sensors.hpp"
 #include "deploy/cli/import_stem_frames.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
@@ -116,6 +117,7 @@ void add_import_command(CLI::App& parent) {
                      "RAW_SCAN, RAW_WHEELS, RAW_GNSS: what lidar_imu_input takes");
 
   victoria->callback([options] { import_victoria_park(*options); });
+  add_bag_import(*command);
   add_sensor_imports(*command);
   add_stem_frames_import(*command);
 }

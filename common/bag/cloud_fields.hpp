@@ -1,0 +1,64 @@
+// Numbers of any type in the points of a PointCloud2.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/bag/messages.hpp"
+
+namespace understory::bag {
+
+/// Reads one field of a point. It lies within the point: find_field() has checked it.
+class FieldReader {
+ public:
+  /// A field of points in this byte order.
+  FieldReader(const PointField& field, bool is_big_endian)
+      : field_(field), is_big_endian_(is_big_endian) {}
+
+  /// The number of the point that begins here.
+  double value(const std::uint8_t* point) const;
+  /// The same where the field has integers; of floats 0.
+  std::int64_t integer(const std::uint8_t* point) const;
+  /// Whether the field's type is one of integers.
+  bool is_integer() const { return field_.type >= 1 && field_.type <= 6; }
+  std::uint8_t type() const { return field_.type; }      ///< As PointField has it.
+  std::string_view name() const { return field_.name; }  ///< Of the field.
+  std::string type_name() const;                         ///< "float32".
+
+ private:
+  PointField field_;
+  bool is_big_endian_;
+};
+
+/// The first of these names that the cloud has. Throws io::DataError where its field does not lie
+/// within a point or has a type that there is not.
+std::optional<FieldReader> find_field(const PointCloud& cloud,
+                                      std::span<const std::string_view> names);
+
+/// Where the points are.
+struct CloudRows {
+  std::uint32_t rows = 0;
+  std::uint32_t columns = 0;
+  std::uint64_t row_bytes = 0;    ///< From one row to the next.
+  std::uint64_t point_bytes = 0;  ///< From one point to the next.
+
+  /// Number of points.
+  std::uint64_t points() const { return std::uint64_t{rows} * columns; }
+  /// A point of data that rows_of() was given.
+  const std::uint8_t* at(std::span<const std::uint8_t> data, std::uint32_t row,
+                         std::uint32_t column) const {
+    return data.data() + row * row_bytes + column * point_bytes;
+  }
+};
+
+/// Height, width and steps, compared with the data. A row step that is too small for its points is
+/// not believed. Throws io::DataError where the data is too short.
+CloudRows rows_of(const PointCloud& cloud);
+
+/// The name of a PointField's type: "float32".
+std::string field_type_name(std::uint8_t type);
+
+}  // namespace understory::bag

@@ -1,0 +1,131 @@
+// The messages that are read, as values.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/bag/message_reader.hpp"
+#include "common/model/planar_scan.hpp"
+
+namespace understory::bag {
+
+/// std_msgs/Header.
+struct Header {
+  std::int64_t stamp_ns = 0;  ///< Since the epoch of the sender's clock.
+  std::string frame;          ///< Without a leading '/'.
+};
+
+/// sensor_msgs/PointField.
+struct PointField {
+  std::string name;
+  std::uint32_t offset = 0;  ///< In a point [bytes].
+  std::uint8_t type = 0;     ///< INT8 = 1, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64.
+  std::uint32_t count = 1;
+};
+
+/// sensor_msgs/PointCloud2; `data` refers to the message's bytes.
+struct PointCloud {
+  Header header;
+  std::uint32_t height = 0;
+  std::uint32_t width = 0;
+  std::vector<PointField> fields;
+  bool is_big_endian = false;
+  std::uint32_t point_step = 0;
+  std::uint32_t row_step = 0;
+  std::span<const std::uint8_t> data;
+};
+
+/// livox_ros_driver/CustomMsg, livox_ros_driver2/CustomMsg.
+struct LivoxCloud {
+  /// One point.
+  struct Point {
+    std::uint32_t offset_ns = 0;  ///< From `base_ns`.
+    Eigen::Vector3f position_m = Eigen::Vector3f::Zero();
+    std::uint8_t reflectivity = 0;
+    std::uint8_t line = 0;
+  };
+  Header header;
+  std::uint64_t base_ns = 0;  ///< Time of the first point, by the sensor.
+  std::vector<Point> points;
+};
+
+/// sensor_msgs/LaserScan.
+struct LaserScan {
+  Header header;
+  model::PlanarScan scan;  ///< Times from the stamp, ranges without those that are no return.
+};
+
+/// sensor_msgs/Imu.
+struct Imu {
+  Header header;
+  Eigen::Vector3d angular_rate_rad_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d specific_force_mps2 = Eigen::Vector3d::Zero();
+};
+
+/// A pose, of whatever message has one: PoseStamped, PoseWithCovarianceStamped, TransformStamped,
+/// Odometry.
+struct Pose {
+  Header header;
+  std::string child_frame;  ///< Whose pose it is; empty = the message does not say.
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+};
+
+/// nav_msgs/Odometry.
+struct Odometry {
+  Pose pose;
+  Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();  ///< Frame `child_frame`.
+  Eigen::Vector3d angular_rate_rad_s = Eigen::Vector3d::Zero();
+};
+
+/// sensor_msgs/NavSatFix.
+struct NavSatFix {
+  Header header;
+  bool has_fix = false;
+  double latitude_deg = 0.0;
+  double longitude_deg = 0.0;
+  double altitude_m = 0.0;
+  double sigma_m = 0.0;  ///< Horizontal, per axis; 0 = unknown.
+};
+
+/// velodyne_msgs/VelodyneScan: packets as they came.
+struct VelodyneScan {
+  /// One packet; `bytes` refers to the message's.
+  struct Packet {
+    std::int64_t stamp_ns = 0;
+    std::span<const std::uint8_t> bytes;
+  };
+  Header header;
+  std::vector<Packet> packets;
+};
+
+// Each throws io::DataError where the bytes are no such message.
+
+/// The header with which most messages begin.
+Header read_header(MessageReader& reader);
+/// sensor_msgs/PointCloud2. Fields and data are not yet compared: see CloudDecoder.
+PointCloud read_point_cloud(MessageReader& reader);
+/// CustomMsg of both Livox drivers.
+LivoxCloud read_livox_cloud(MessageReader& reader);
+/// sensor_msgs/LaserScan.
+LaserScan read_laser_scan(MessageReader& reader);
+/// sensor_msgs/Imu.
+Imu read_imu(MessageReader& reader);
+/// nav_msgs/Odometry.
+Odometry read_odometry(MessageReader& reader);
+/// sensor_msgs/NavSatFix.
+NavSatFix read_nav_sat_fix(MessageReader& reader);
+/// velodyne_msgs/VelodyneScan.
+VelodyneScan read_velodyne_scan(MessageReader& reader);
+/// tf2_msgs/TFMessage.
+std::vector<Pose> read_transforms(MessageReader& reader);
+/// A message of a pose type.
+Pose read_pose(MessageReader& reader, const std::string& type);
+/// Whether read_pose() knows the type.
+bool is_pose_type(const std::string& type);
+
+}  // namespace understory::bag

@@ -1,0 +1,37 @@
+// Where frames lie on a vehicle, from /tf_static.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bag/messages.hpp"
+
+namespace understory::bag {
+
+/// A tree of frames that do not move against each other.
+class StaticTransforms {
+ public:
+  /// A transform; a later one of the same child replaces it.
+  void add(const Pose& parent_T_child);
+  /// Takes coordinates of `from` to `to`; none where no chain joins them.
+  std::optional<Eigen::Isometry3d> find(const std::string& to, const std::string& from) const;
+  /// Whether the tree names it.
+  bool has(const std::string& frame) const;
+  /// All frames.
+  std::vector<std::string> frames() const;
+
+ private:
+  struct Link {
+    std::string parent;
+    Eigen::Isometry3d parent_T_child;
+  };
+  /// The frame's ancestors, itself first, each with the transform from the frame to it.
+  std::vector<std::pair<std::string, Eigen::Isometry3d>> ancestors(const std::string& frame) const;
+
+  std::map<std::string, Link> links_;  ///< By child.
+};
+
+}  // namespace understory::bag

@@ -1,0 +1,252 @@
+#include "deploy/cli/import_bag_messages.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/io/data_error.hpp"
+#include "common/io/text_file.hpp"
+#include "understory/ground_truth_t.hpp"
+
+namespace understory::cli {
+namespace {
+
+/// Below it a steering angle cannot be told from noise [m/s].
+constexpr double kSlow_mps = 0.1;
+constexpr double kMoved_m = 1.0;
+
+std::optional<io::VelodyneModel> model_of_packet(std::span<const std::uint8_t> packet) {
+  for (const io::VelodyneModel model :
+       {io::VelodyneModel::kVlp16, io::VelodyneModel::kVlp32c, io::VelodyneModel::kHdl32e}) {
+    if (!check_velodyne_packet(packet, model)) return model;
+  }
+  return std::nullopt;
+}
+
+io::VelodyneCalibration calibration_for(const BagConversion& conversion,
+                                        std::span<const std::uint8_t> packet) {
+  if (!conversion.velodyne_calibration.empty())
+    return io::parse_hdl64_calibration(io::read_whole_file(conversion.velodyne_calibration),
+                                       conversion.velodyne_calibration);
+  const auto model = conversion.velodyne_model.empty()
+                         ? model_of_packet(packet)
+                         : io::velodyne_model(conversion.velodyne_model);
+  if (!model)
+    throw io::DataError(
+        "packets of a model that they do not name: --model vlp16, vlp32c, hdl32e, or "
+        "--calibration FILE for an hdl64e");
+  return velodyne_calibration(*model);
+}
+
+double yaw_of(const Eigen::Isometry3d& pose) {
+  return std::atan2(pose.linear()(1, 0), pose.linear()(0, 0));
+}
+
+}  // namespace
+
+/// Made when the first packet comes.
+struct BagMessages::Velodyne {
+  io::VelodyneDecoder decoder;
+};
+
+BagMessages::BagMessages(const bag::Bag& bag, const bag::Survey& survey, const BagChoice& choice,
+                         const BagMounts& mounts, BagConversion conversion, BagLog& log)
+    : bag_(bag),
+      survey_(survey),
+      choice_(choice),
+      mounts_(mounts),
+      conversion_(std::move(conversion)),
+      log_(log),
+      numbers_(bag.topics().size(), 0),
+      decoder_(conversion_.cloud) {}
+
+BagMessages::~BagMessages() = default;
+
+void BagMessages::take(const bag::Message& message) {
+  const std::uint64_t number = ++numbers_[message.topic];
+  try {
+    convert(message);
+  } catch (const io::DataError& error) {
+    throw io::DataError(
+        fmt::format("{}, message {}: {}", bag_.topics()[message.topic].name, number, error.what()));
+  }
+}
+
+void BagMessages::convert(const bag::Message& message) {
+  const auto is = [&](const std::optional<std::size_t>& topic) { return topic == message.topic; };
+  if (is(choice_.cloud)) take_cloud(message);
+  if (is(choice_.scan)) take_scan(message);
+  if (is(choice_.imu)) take_imu(message);
+  if (is(choice_.odometry)) take_odometry(message);
+  if (is(choice_.gnss)) take_fix(message);
+  if (is(choice_.truth)) take_truth(message);
+}
+
+/// To be added to the topic's stamps.
+std::int64_t BagMessages::shift_ns(std::size_t topic) const {
+  if (!conversion_.by_reception.contains(topic)) return 0;
+  constexpr double kMost_ns = 4e18;
+  const double shift = -1e9 * survey_.topics[topic].stamp_minus_received_s;
+  return std::llround(std::clamp(shift, -kMost_ns, kMost_ns));
+}
+
+model::Utime BagMessages::utime_of(const bag::Header& header, std::size_t topic) const {
+  const std::int64_t stamp = header.stamp_ns + shift_ns(topic);
+  if (stamp < 0) throw io::DataError("a stamp before 1970");
+  return stamp / 1000;
+}
+
+void BagMessages::add_sweep(const model::PointSweep& sweep) {
+  if (sweep.points.empty()) {
+    ++empty_clouds_;
+    return;
+  }
+  if (sweep.utime < 0) throw io::DataError("a stamp before 1970");
+  has_times_ = sweep.has_times;
+  has_rings_ = sweep.rings > 0;
+  log_.add_sweep(sweep);
+}
+
+void BagMessages::take_cloud(const bag::Message& message) {
+  const std::string& type = bag_.topics()[message.topic].type;
+  bag::MessageReader reader = reader_of(bag_, message);
+  if (type == "velodyne_msgs/VelodyneScan")
+    return take_packets(read_velodyne_scan(reader), shift_ns(message.topic));
+
+  model::PointSweep sweep = type == "sensor_msgs/PointCloud2"
+                                ? decoder_.decode(read_point_cloud(reader))
+                                : decoder_.decode(read_livox_cloud(reader));
+  // The decoder compares times of points with the stamp as it is.
+  sweep.utime += shift_ns(message.topic) / 1000;
+  add_sweep(sweep);
+}
+
+void BagMessages::take_packets(const bag::VelodyneScan& scan, std::int64_t shift_ns) {
+  for (const bag::VelodyneScan::Packet& packet : scan.packets) {
+    if (!velodyne_)
+      velodyne_ = std::make_unique<Velodyne>(
+          Velodyne{io::VelodyneDecoder(calibration_for(conversion_, packet.bytes))});
+    if (const auto sweep =
+            velodyne_->decoder.add(packet.bytes, (packet.stamp_ns + shift_ns) / 1000))
+      add_sweep(*sweep);
+  }
+}
+
+void BagMessages::take_scan(const bag::Message& message) {
+  bag::MessageReader reader = reader_of(bag_, message);
+  bag::LaserScan scan = read_laser_scan(reader);
+  scan.scan.utime = utime_of(scan.header, message.topic);
+  const model::Utime end = scan.scan.end();
+  log_.add("RAW_SCAN", std::move(scan.scan), end);
+}
+
+void BagMessages::take_imu(const bag::Message& message) {
+  bag::MessageReader reader = reader_of(bag_, message);
+  const bag::Imu imu = read_imu(reader);
+  model::ImuSample sample;
+  sample.utime = utime_of(imu.header, message.topic);
+  sample.angular_rate_rad_s = imu.angular_rate_rad_s;
+  sample.specific_force_mps2 = imu.specific_force_mps2;
+  log_.add("RAW_IMU", sample, sample.utime);
+}
+
+void BagMessages::take_odometry(const bag::Message& message) {
+  bag::MessageReader reader = reader_of(bag_, message);
+  const bag::Odometry odometry = read_odometry(reader);
+  const bag::Pose& pose = odometry.pose;
+  double speed_mps = odometry.velocity_mps.x();
+  double rate_rad_s = odometry.angular_rate_rad_s.z();
+  fastest_mps_ = std::max(fastest_mps_, odometry.velocity_mps.norm());
+  if (!first_position_m_) first_position_m_ = pose.pose.translation();
+  farthest_m_ = std::max(farthest_m_, (pose.pose.translation() - *first_position_m_).norm());
+
+  const auto last = std::exchange(last_pose_, pose);
+  if (conversion_.has_speed_from_pose) {
+    const double seconds =
+        last ? 1e-9 * static_cast<double>(pose.header.stamp_ns - last->header.stamp_ns) : 0.0;
+    if (seconds <= 0.0) return;
+    const Eigen::Isometry3d motion = last->pose.inverse() * pose.pose;
+    speed_mps = motion.translation().x() / seconds;
+    rate_rad_s = yaw_of(motion) / seconds;
+  }
+
+  model::WheelSample wheels;
+  wheels.utime = utime_of(pose.header, message.topic);
+  wheels.speed_mps = speed_mps;
+  if (std::abs(speed_mps) > kSlow_mps)
+    wheels.steering_rad = std::atan(conversion_.wheelbase_m * rate_rad_s / speed_mps);
+  log_.add("RAW_WHEELS", wheels, wheels.utime);
+}
+
+void BagMessages::take_fix(const bag::Message& message) {
+  bag::MessageReader reader = reader_of(bag_, message);
+  const bag::NavSatFix fix = read_nav_sat_fix(reader);
+  if (!fix.has_fix) {
+    ++without_fix_;
+    return;
+  }
+  if (!plane_) plane_.emplace(fix.latitude_deg, fix.longitude_deg);
+  model::GnssFix out;
+  out.utime = utime_of(fix.header, message.topic);
+  out.east_north_m = plane_->east_north_m(fix.latitude_deg, fix.longitude_deg);
+  out.sigma_m = fix.sigma_m;
+  log_.add("RAW_GNSS", out, out.utime);
+}
+
+void BagMessages::take_truth(const bag::Message& message) {
+  bag::MessageReader reader = reader_of(bag_, message);
+  const bag::Pose pose = read_pose(reader, bag_.topics()[message.topic].type);
+  const std::string& frame =
+      conversion_.truth_frame.empty() ? pose.child_frame : conversion_.truth_frame;
+  Eigen::Isometry3d world_T_vehicle = pose.pose;
+  if (!frame.empty() && frame != mounts_.base()) {
+    const auto vehicle_T_frame = mounts_.find(frame);
+    if (!vehicle_T_frame)
+      throw io::DataError("the pose is that of " + frame + ": " + mounts_.missing(frame));
+    world_T_vehicle = pose.pose * vehicle_T_frame->inverse();
+  }
+
+  ground_truth_t truth{};
+  truth.utime = utime_of(pose.header, message.topic);
+  truth.world_T_vehicle = wire::to_wire(
+      geometry::SE2(world_T_vehicle.translation().head<2>(), yaw_of(world_T_vehicle)));
+  log_.add("GROUND_TRUTH", truth, truth.utime);
+}
+
+void BagMessages::finish() {
+  if (velodyne_) {
+    if (const auto sweep = velodyne_->decoder.finish()) add_sweep(*sweep);
+  }
+  if (choice_.odometry && !conversion_.has_speed_from_pose && fastest_mps_ == 0.0 &&
+      farthest_m_ > kMoved_m)
+    throw io::DataError(
+        fmt::format("{}: its poses move by {:.1f} m and its twist is always zero: "
+                    "--speed-from-pose takes the speed from the poses",
+                    bag_.topics()[*choice_.odometry].name, farthest_m_));
+}
+
+std::string BagMessages::cloud_text() const {
+  if (!choice_.cloud) return {};
+  if (!velodyne_) return decoder_.description();
+  const io::VelodyneCounts& counts = velodyne_->decoder.counts();
+  return fmt::format("{} Velodyne packets, {} refused, {} gaps", counts.packets, counts.refused,
+                     counts.lost_azimuth);
+}
+
+std::vector<std::string> BagMessages::remarks() const {
+  std::vector<std::string> lines;
+  if (empty_clouds_ > 0)
+    lines.push_back(fmt::format("{} clouds without a point are left out", empty_clouds_));
+  if (without_fix_ > 0)
+    lines.push_back(fmt::format("{} messages of GNSS without a fix are left out", without_fix_));
+  if (log_.late() > 0)
+    lines.push_back(
+        fmt::format("{} messages have stamps more than 1 s behind others: do the clocks "
+                    "agree? (--list; --receive-time TOPIC)",
+                    log_.late()));
+  return lines;
+}
+
+}  // namespace understory::cli

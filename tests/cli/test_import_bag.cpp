@@ -1,0 +1,369 @@
+// Bags through the command: the same log from every container, and a line for everything that a
+// person must decide.
+#include <cmath>
+#include <map>
+
+#include "common/wire/convert.hpp"
+#include "deploy/cli/sensor_simulation.hpp"
+#include "tests/bag/bag_writer.hpp"
+#include "tests/catch.hpp"
+#include "tests/cli/run_command.hpp"
+#include "tests/io/velodyne_packets.hpp"
+#include "understory/ground_truth_t.hpp"
+#include "understory/lidar_sweep_t.hpp"
+
+using namespace understory;
+using namespace understory::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
+constexpr double kWheelbase_m = 2.7;
+
+Eigen::Isometry3d place(double x, double y, double z, double yaw = 0.0) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = Eigen::Vector3d(x, y, z);
+  pose.linear() = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return pose;
+}
+
+/// Each channel's messages.
+std::map<std::string, std::vector<Bytes>> channels_of(const std::filesystem::path& log) {
+  std::map<std::string, std::vector<Bytes>> channels;
+  io::LcmLogReader reader(log);
+  while (auto event = reader.next()) channels[event->channel].push_back(std::move(event->data));
+  return channels;
+}
+
+/// A cloud as Ouster's driver sends it, unordered.
+bag::PointCloud cloud_of(const bag::Header& header, const model::PointSweep& sweep,
+                         std::vector<std::uint8_t>& data) {
+  bag::PointCloud cloud;
+  cloud.header = header;
+  cloud.height = 1;
+  cloud.width = static_cast<std::uint32_t>(sweep.points.size());
+  cloud.fields = {{"x", 0, 7, 1},          {"y", 4, 7, 1},  {"z", 8, 7, 1},
+                  {"intensity", 16, 7, 1}, {"t", 20, 6, 1}, {"ring", 24, 4, 1}};
+  cloud.point_step = 32;
+  cloud.row_step = 32 * cloud.width;
+  data.assign(cloud.row_step, 0);
+  for (std::size_t i = 0; i < sweep.points.size(); ++i) {
+    const model::SweepPoint& point = sweep.points[i];
+    std::uint8_t* at = data.data() + 32 * i;
+    const float numbers[] = {point.x_m, point.y_m, point.z_m};
+    const auto intensity = static_cast<float>(point.intensity);
+    const auto time =
+        static_cast<std::uint32_t>(std::llround(1e9 * static_cast<double>(point.time_s)));
+    std::memcpy(at, numbers, sizeof numbers);
+    std::memcpy(at + 16, &intensity, 4);
+    std::memcpy(at + 20, &time, 4);
+    std::memcpy(at + 24, &point.ring, 2);
+  }
+  cloud.data = data;
+  return cloud;
+}
+
+/// What the simulated sensors gave, for a log and for a bag.
+struct Drive {
+  std::map<std::string, std::vector<Bytes>> log;
+  std::map<bag::Encoding, std::vector<Recorded>> bag;
+
+  template <class Message>
+  void add_to_log(const std::string& channel, const Message& message) {
+    log[channel].push_back(wire::encode_message(message));
+  }
+};
+
+class DriveRecorder {
+ public:
+  /// Some seconds of a drive through a forest.
+  static Drive record() {
+    cli::SensorSimulationOptions options;
+    options.world = "forest3d";
+    options.lidar = "vlp16";
+    options.standstill_s = 1.0;
+    sim::SensorDrive drive = cli::make_sensor_drive(options);
+    DriveRecorder recorder;
+    recorder.add_mounts();
+    while (auto reading = drive.next()) {
+      if (cli::complete_at(*reading, drive) > 4'000'000) break;
+      recorder.now_ns_ = 1000 * cli::complete_at(*reading, drive) + kStart_ns;
+      std::visit([&](auto& value) { recorder.take(value); }, *reading);
+    }
+    return std::move(recorder.drive_);
+  }
+
+ private:
+  template <class Make>
+  void add(const std::string& topic, const std::string& type, Make make) {
+    for (const auto encoding : {bag::Encoding::kRos1, bag::Encoding::kCdr})
+      drive_.bag[encoding].push_back({topic, type, now_ns_, make(Serialisation{encoding, false})});
+  }
+  bag::Header header(model::Utime utime, const std::string& frame) { return {utime * 1000, frame}; }
+  void add_mounts() {
+    now_ns_ = kStart_ns;
+    const std::vector<bag::Pose> transforms{{{0, "base_link"}, "mast", place(1.0, 0.0, 1.0)},
+                                            {{0, "/mast"}, "laser", place(0.2, 0.0, 0.9)},
+                                            {{0, "base_link"}, "imu", place(1.0, 0.0, 0.6)}};
+    add("/tf_static", "tf2_msgs/TFMessage",
+        [&](const Serialisation& how) { return transforms_message(how, transforms); });
+  }
+  void take(model::ImuSample& imu) {
+    imu.utime += kStart_ns / 1000;
+    drive_.add_to_log("RAW_IMU", imu);
+    add("/imu/data", "sensor_msgs/Imu", [&](const Serialisation& how) {
+      return imu_message(
+          how, {header(imu.utime, "imu"), imu.angular_rate_rad_s, imu.specific_force_mps2});
+    });
+  }
+  void take(model::WheelSample& wheels) {
+    wheels.utime += kStart_ns / 1000;
+    wheels.steering_rad = 0.0;
+    drive_.add_to_log("RAW_WHEELS", wheels);
+    add("/odom", "nav_msgs/Odometry", [&](const Serialisation& how) {
+      return odometry_message(how, {{header(wheels.utime, "odom"), "base_link", place(0, 0, 0)},
+                                    {wheels.speed_mps, 0.0, 0.0},
+                                    Eigen::Vector3d::Zero()});
+    });
+  }
+  void take(model::GnssFix& fix) {
+    fix.utime += kStart_ns / 1000;
+    add("/fix", "sensor_msgs/NavSatFix", [&](const Serialisation& how) {
+      return fix_message(how, {header(fix.utime, "gnss"), true, 48.0 + 1e-5 * fix.east_north_m.y(),
+                               9.0, 500.0, 2.0});
+    });
+    ++fixes_;
+  }
+  void take(sim::TruePose& pose) {
+    add("/reference", "geometry_msgs/PoseStamped", [&](const Serialisation& how) {
+      const geometry::SE2 world_T_vehicle = pose.state.world_T_level();
+      return pose_message(
+          how, {header(pose.utime + kStart_ns / 1000, "map"), "",
+                place(world_T_vehicle.x(), world_T_vehicle.y(), 0.0, world_T_vehicle.theta())});
+    });
+  }
+  void take(sim::SimulatedPlanarScan& /*scan*/) {}
+  void take(sim::SimulatedSweep& sweep) {
+    model::PointSweep& raw = sweep.raw;
+    raw.utime += kStart_ns / 1000;
+    // Whole steps of the wire's times: what the parts of a sweep are rounded to.
+    for (model::SweepPoint& point : raw.points)
+      point.time_s =
+          static_cast<float>(4e-6 * std::round(static_cast<double>(point.time_s) / 4e-6));
+    for (model::PointSweep& part : split_sweep(raw, 5900)) {
+      part.sequence = parts_++;
+      drive_.add_to_log("RAW_SWEEP", part);
+    }
+    std::vector<std::uint8_t> data;
+    const bag::PointCloud cloud = cloud_of(header(raw.utime, "laser"), raw, data);
+    add("/points", "sensor_msgs/PointCloud2",
+        [&](const Serialisation& how) { return cloud_message(how, cloud); });
+  }
+
+  Drive drive_;
+  std::int64_t now_ns_ = 0;
+  std::uint64_t parts_ = 0;
+  std::uint64_t fixes_ = 0;
+};
+
+/// A folder with one bag.
+struct BagFolder {
+  TemporaryDirectory directory;
+
+  std::string path(const std::string& name) const { return (directory / name).string(); }
+  std::string write(const BagForm& form, const std::vector<Recorded>& messages) const {
+    write_bag(directory / form.file(), form, messages);
+    return path(form.file());
+  }
+  Outcome import(const std::string& bag, const std::string& more) const {
+    return understory_command(directory, "import bag " + bag + " " + more);
+  }
+  void refused(const std::string& bag, const std::string& more, const std::string& what) const {
+    const Outcome outcome = import(bag, more + " --out " + path("refused.lcm"));
+    CAPTURE(more, outcome.out, outcome.error);
+    CHECK(outcome.status != 0);
+    CHECK(lines(outcome.error) == 1);
+    CHECK_THAT(outcome.error, Contains(what));
+    CHECK_FALSE(std::filesystem::exists(path("refused.lcm")));
+  }
+};
+
+Recorded imu_at(std::int64_t time_ns, std::int64_t stamp_ns, const std::string& topic = "/imu") {
+  return {topic, "sensor_msgs/Imu", time_ns,
+          imu_message({bag::Encoding::kCdr, false}, {{stamp_ns, "imu"}, {0, 0, 0}, {0, 0, 9.81}})};
+}
+
+}  // namespace
+
+TEST_CASE("import bag: every container gives what the sensors gave, byte for byte", "[import]") {
+  const Drive drive = DriveRecorder::record();
+  const BagFolder folder;
+  std::string first;
+  for (const BagForm& form : all_bag_forms()) {
+    CAPTURE(form.name());
+    BagForm large = form;
+    large.chunk_bytes = 700'000;
+    const std::string bag = folder.write(large, drive.bag.at(form.encoding()));
+    const std::string log = folder.path("run.lcm");
+    const Outcome outcome =
+        folder.import(bag, "--odometry /odom --truth /reference --max-range 100 --out " + log +
+                               " --config " + folder.path("config"));
+    CAPTURE(outcome.error);
+    REQUIRE(outcome.status == 0);
+
+    const auto channels = channels_of(log);
+    for (const char* channel : {"RAW_SWEEP", "RAW_IMU", "RAW_WHEELS"})
+      CHECK(channels.at(channel) == drive.log.at(channel));
+    CHECK(channels.at("GROUND_TRUTH").size() > 100);
+    CHECK(channels.at("RAW_GNSS").size() >= 7);
+    if (first.empty()) first = file_bytes(log);
+    CHECK(file_bytes(log) == first);
+  }
+
+  // Mounts are those of the chain of transforms; replay takes the folder as it is.
+  const std::string settings = read_text(folder.path("config") + "/lidar_imu_input.toml");
+  CHECK_THAT(settings, Contains("[imu.mount]\nx_m = 1.000000\nz_m = 0.600000\n"));
+  CHECK_THAT(settings, Contains("[lidar.mount]\nx_m = 1.200000\nz_m = 1.900000\n"));
+  const Outcome replay = understory_command(
+      folder.directory, "replay " + folder.path("run.lcm") + " --config " + folder.path("config") +
+                            " --out " + folder.path("replayed.lcm"));
+  CAPTURE(replay.error);
+  REQUIRE(replay.status == 0);
+  CHECK(channels_of(folder.path("replayed.lcm"))["LIDAR_SWEEP"].size() > 30);
+}
+
+TEST_CASE("import bag --list: topics, clocks, mounts, and what each becomes", "[import]") {
+  const Drive drive = DriveRecorder::record();
+  const BagFolder folder;
+  const std::string bag =
+      folder.write({BagForm::Kind::kMcap, "zstd"}, drive.bag.at(bag::Encoding::kCdr));
+  const Outcome outcome = folder.import(bag, "--list");
+  REQUIRE(outcome.status == 0);
+  for (const char* what :
+       {"MCAP, ", "2023-11-14 22:13:20 UTC", "/points", "sensor_msgs/PointCloud2", "RAW_SWEEP",
+        "200.00", "+0.000", "--odometry /odom or --truth /odom", "--truth /reference",
+        "times: t (uint32, unit 1e-09 s, from the stamp); rings: ring, 16 counted upwards",
+        "mount: laser on base_link: x 1.200 y 0.000 z 1.900 m"})
+    CHECK_THAT(outcome.out, Contains(what));
+}
+
+TEST_CASE("import bag: what is ambiguous is asked for by name", "[import]") {
+  const BagFolder folder;
+  const std::string bag = folder.write({BagForm::Kind::kSqlite},
+                                       {imu_at(kStart_ns, kStart_ns, "/a"),
+                                        imu_at(kStart_ns, kStart_ns, "/b"),
+                                        {"/chatter", "std_msgs/String", kStart_ns, {0, 1, 0, 0}}});
+  folder.refused(bag, "", "which one is --imu: /a (sensor_msgs/Imu, 1 messages), /b");
+  folder.refused(bag, "--imu /c", "no such topic; there are: /a");
+  folder.refused(bag, "--imu /chatter", "its type is std_msgs/String");
+  folder.refused(bag, "--imu none", "nothing that can be imported");
+  folder.refused(bag, "--imu /a --mount imu=1,2", "FRAME=x,y,z");
+  folder.refused(bag, "--list", "either --list or --out");
+  const Outcome listed = folder.import(bag, "--list");
+  CHECK_THAT(listed.out, Contains("--imu /a"));
+
+  const Outcome outcome = folder.import(bag, "--imu /b --out " + folder.path("run.lcm"));
+  REQUIRE(outcome.status == 0);
+  CHECK_THAT(outcome.error, Contains("no static transform joins base_link and imu"));
+  CHECK_THAT(outcome.error, Contains("--mount imu="));
+  CHECK(channels_of(folder.path("run.lcm"))["RAW_IMU"].size() == 1);
+  const Outcome stated =
+      folder.import(bag, "--imu /b --mount imu=1,0,0.5,0,0,1.5 --out " + folder.path("run.lcm"));
+  CHECK_THAT(stated.out, Contains("z_m = 0.500000\nyaw_rad = 1.500000"));
+  CHECK(stated.error.empty());
+}
+
+TEST_CASE("import bag: clocks that differ are named and laid onto the recorder's", "[import]") {
+  const BagFolder folder;
+  std::vector<Recorded> messages;
+  const Serialisation cdr{bag::Encoding::kCdr, false};
+  for (std::int64_t i = 0; i < 20; ++i) {
+    const std::int64_t now = kStart_ns + i * 100'000'000;
+    messages.push_back(imu_at(now, now - 2'000'000));
+    // A sensor that counts from when it was switched on.
+    model::PlanarScan scan;
+    scan.bearing_step_rad = 0.1;
+    scan.max_range_m = 30.0;
+    scan.ranges_m = {1.0F, 2.0F};
+    messages.push_back({"/scan", "sensor_msgs/LaserScan", now,
+                        scan_message(cdr, {i * 100'000'000 + 50'000'000'000, "laser"}, scan)});
+  }
+  const std::string bag = folder.write({BagForm::Kind::kMcap}, messages);
+  const std::string out = " --out " + folder.path("run.lcm");
+  CHECK_THAT(folder.import(bag, "--list").out, Contains("--receive-time /scan"));
+  CHECK_THAT(folder.import(bag, out).error, Contains("--receive-time /scan"));
+  const Outcome mended = folder.import(bag, "--receive-time /scan" + out);
+  REQUIRE(mended.status == 0);
+  CHECK_THAT(mended.error, !Contains("--receive-time"));
+  const auto scans = channels_of(folder.path("run.lcm"))["RAW_SCAN"];
+  REQUIRE(scans.size() == 20);
+  lidar_scan_t scan{};
+  scan.decode(scans[3].data(), 0, static_cast<int>(scans[3].size()));
+  CHECK(std::abs(scan.utime - (kStart_ns / 1000 + 300'000)) < 1000);
+  folder.refused(bag, "--receive-time /none", "no such topic");
+}
+
+TEST_CASE("import bag --list: an IMU in g, upside down, tilted, without gravity", "[import]") {
+  const BagFolder folder;
+  const auto listed = [&](const Eigen::Vector3d& force) {
+    const MessageBytes message =
+        imu_message({bag::Encoding::kCdr, false}, {{kStart_ns, "base_link"}, {0, 0, 0}, force});
+    const std::string bag =
+        folder.write({BagForm::Kind::kMcap}, {{"/imu", "sensor_msgs/Imu", kStart_ns, message},
+                                              {"/imu", "sensor_msgs/Imu", kStart_ns + 1, message}});
+    return folder.import(bag, "--list").out;
+  };
+  CHECK_THAT(listed({0, 0, 9.8}), Contains("(0.00, 0.00, 9.80) m/s^2\n"));
+  CHECK_THAT(listed({0, 0, 1.0}), Contains("in g"));
+  CHECK_THAT(listed({0, 0, 0.1}), Contains("gravity is missing"));
+  CHECK_THAT(listed({0, 0, -9.8}), Contains("points down"));
+  CHECK_THAT(listed({9.8, 0, 0.3}), Contains("points sideways"));
+}
+
+TEST_CASE("import bag: odometry without a twist, and packets", "[import]") {
+  const BagFolder folder;
+  const Serialisation ros1{bag::Encoding::kRos1, false};
+  std::vector<Recorded> messages;
+  PacketMaker maker;
+  MessageWriter packets(ros1);
+  packets.header({kStart_ns, "velodyne"}).number(std::uint32_t{170});
+  for (std::int64_t i = 0; i < 170; ++i) packets.stamp(kStart_ns + i * 1'327'104).raw(maker.next());
+  messages.push_back(
+      {"/velodyne_packets", "velodyne_msgs/VelodyneScan", kStart_ns, packets.bytes()});
+  for (std::int64_t i = 0; i < 30; ++i) {
+    const std::int64_t now = kStart_ns + i * 100'000'000;
+    messages.push_back(
+        {"/odom", "nav_msgs/Odometry", now,
+         odometry_message(ros1,
+                          {{{now, "odom"}, "base_link", place(0.2 * static_cast<double>(i), 0, 0)},
+                           {0, 0, 0},
+                           {0, 0, 0}})});
+  }
+  const std::string bag = folder.write({BagForm::Kind::kRos1, "lz4"}, messages);
+  folder.refused(bag, "--odometry /odom", "--speed-from-pose");
+  const Outcome outcome = folder.import(
+      bag, "--odometry /odom --speed-from-pose --truth /odom --out " + folder.path("run.lcm"));
+  CAPTURE(outcome.error);
+  REQUIRE(outcome.status == 0);
+  CHECK_THAT(outcome.out, Contains("170 Velodyne packets, 0 refused"));
+  auto channels = channels_of(folder.path("run.lcm"));
+  CHECK(channels["RAW_SWEEP"].size() >= 1);
+  REQUIRE(channels["RAW_WHEELS"].size() == 29);
+  CHECK(channels["GROUND_TRUTH"].size() == 30);
+  const auto& bytes = channels["RAW_WHEELS"][5];
+  const auto wheels = wire::decode_message<model::WheelSample>(bytes);
+  REQUIRE(wheels);
+  CHECK(wheels.value().speed_mps == Approx(2.0));
+}
+
+TEST_CASE("import bag: a damaged message is named by file, topic and number", "[import]") {
+  const BagFolder folder;
+  auto messages =
+      std::vector<Recorded>{imu_at(kStart_ns, kStart_ns), imu_at(kStart_ns + 1, kStart_ns),
+                            imu_at(kStart_ns + 2, kStart_ns)};
+  messages[1].data.resize(100);
+  const std::string bag = folder.write({BagForm::Kind::kMcap, "lz4"}, messages);
+  folder.refused(bag, "", bag + ": /imu, message 2: 104 bytes are wanted at byte 16 of 96");
+  CHECK_THAT(folder.import(bag, "--list").out, Contains("/imu"));
+}
