@@ -7,8 +7,10 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "common/geometry/point_bins.hpp"
 #include "common/io/data_error.hpp"
@@ -23,14 +25,6 @@ constexpr double kThickestTrunkM = 20.0;
 constexpr double kLargestSigmaM = 1e3;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
-enum LandmarkColumn : std::size_t {
-  kXColumn,
-  kYColumn,
-  kSigmaColumn,
-  kDiameterColumn,
-  kKindColumn,
-  kLandmarkColumns
-};
 constexpr std::array<std::string_view, kLandmarkColumns> kLandmarkColumnNames{
     "x_m", "y_m", "sigma_m", "dbh_m", "kind"};
 
@@ -41,12 +35,24 @@ std::string_view bare_cell(std::string_view cell) {
   return cell.substr(first, cell.find_last_not_of(" \t\r\"") - first + 1);
 }
 
-std::vector<std::string_view> cells_of_line(std::string_view line) {
+/// What separates the cells: the first of semicolon, tab and comma that the heading has.
+char delimiter_of(std::string_view heading) {
+  for (const char one : {';', '\t'}) {
+    if (heading.find(one) != std::string_view::npos) return one;
+  }
+  return ',';
+}
+
+/// A delimiter between quotation marks is none.
+std::vector<std::string_view> cells_of_line(std::string_view line, char delimiter) {
   std::vector<std::string_view> cells;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    cells.push_back(bare_cell(line.substr(begin, end - begin)));
-    begin = end + 1;
+  std::size_t begin = 0;
+  bool is_quoted = false;
+  for (std::size_t i = 0; i <= line.size(); ++i) {
+    if (i < line.size() && line[i] == '"') is_quoted = !is_quoted;
+    if (i < line.size() && (is_quoted || line[i] != delimiter)) continue;
+    cells.push_back(bare_cell(line.substr(begin, i - begin)));
+    begin = i + 1;
   }
   return cells;
 }
@@ -54,8 +60,10 @@ std::vector<std::string_view> cells_of_line(std::string_view line) {
 /// The table line by line.
 class LandmarkTable {
  public:
-  LandmarkTable(std::string_view text, std::string_view source, double default_sigma_m)
-      : source_(source), default_sigma_m_(default_sigma_m) {
+  LandmarkTable(std::string_view text, std::string_view source, const LandmarkTableOptions& options)
+      : source_(source), options_(options) {
+    if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+      throw DataError(fmt::format("{}: UTF-16 text: save it as CSV in UTF-8", source_));
     if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
     for (std::size_t begin = 0; begin < text.size();) {
       const std::size_t end = std::min(text.find('\n', begin), text.size());
@@ -63,37 +71,30 @@ class LandmarkTable {
       begin = end + 1;
       ++line_;
       if (bare_cell(line).empty() || bare_cell(line).front() == '#') continue;
-      is_headed_ ? take_row(cells_of_line(line)) : take_heading(cells_of_line(line));
+      headings_ ? take_row(cells_of_line(line, delimiter_)) : take_heading(line);
     }
 
-    if (!is_headed_)
+    if (!headings_)
       throw DataError(fmt::format("{}: no heading (x_m,y_m[,sigma_m][,dbh_m][,kind])", source_));
     if (rows_.empty()) throw DataError(fmt::format("{}: no landmark in it", source_));
   }
 
-  std::vector<LandmarkRow> take() { return std::move(rows_); }
+  LandmarkRows take() { return {std::move(rows_), std::move(headings_->passed_over)}; }
 
  private:
   [[noreturn]] void refuse(const std::string& why) const {
     throw DataError(fmt::format("{}, line {}: {}", source_, line_, why));
   }
 
-  void take_heading(const std::vector<std::string_view>& cells) {
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      const auto* const known = std::ranges::find(kLandmarkColumnNames, cells[i]);
-      if (known == kLandmarkColumnNames.end())
-        refuse(fmt::format("unknown column '{}'; known are {}", cells[i].substr(0, 40),
-                           fmt::join(kLandmarkColumnNames, ", ")));
-      auto& place = places_[static_cast<std::size_t>(known - kLandmarkColumnNames.begin())];
-      if (place) refuse(fmt::format("column {} comes twice", cells[i]));
-      place = i;
-    }
-
-    for (const LandmarkColumn column : {kXColumn, kYColumn}) {
-      if (!places_[column]) refuse(fmt::format("no column {}", kLandmarkColumnNames[column]));
+  void take_heading(std::string_view line) {
+    delimiter_ = delimiter_of(line);
+    const std::vector<std::string_view> cells = cells_of_line(line, delimiter_);
+    try {
+      headings_ = recognise_headings(cells, options_.columns);
+    } catch (const std::invalid_argument& error) {
+      refuse(error.what());
     }
     cells_ = cells.size();
-    is_headed_ = true;
   }
 
   void take_row(const std::vector<std::string_view>& cells) {
@@ -102,40 +103,52 @@ class LandmarkTable {
     LandmarkRow row;
     row.line = line_;
     model::MapLandmark& landmark = row.landmark;
-    landmark.position_m = {coordinate(cells, kXColumn), coordinate(cells, kYColumn)};
-    const double sigma = within(cells, kSigmaColumn, kLargestSigmaM).value_or(default_sigma_m_);
+    landmark.position_m = {coordinate(cells, LandmarkColumn::kX),
+                           coordinate(cells, LandmarkColumn::kY)};
+    const double sigma =
+        within(cells, LandmarkColumn::kSigma, kLargestSigmaM).value_or(options_.sigma_m);
     if (sigma == 0.0) refuse("sigma_m is 0: every estimate has an error");
     landmark.covariance_m2 = sigma * sigma * Eigen::Matrix2d::Identity();
-    landmark.radius_m = 0.5 * within(cells, kDiameterColumn, kThickestTrunkM).value_or(0.0);
+    landmark.radius_m =
+        0.5 * within(cells, LandmarkColumn::kDiameter, kThickestTrunkM).value_or(0.0);
     landmark.kind = kind(cells);
     rows_.push_back(row);
   }
 
   std::string_view cell(const std::vector<std::string_view>& cells, LandmarkColumn column) const {
-    return places_[column] ? cells[*places_[column]] : std::string_view();
+    const auto& found = headings_->at(column);
+    return found ? cells[found->place] : std::string_view();
   }
 
+  static std::string_view name_of(LandmarkColumn column) {
+    return kLandmarkColumnNames[static_cast<std::size_t>(column)];
+  }
+
+  /// In metres. A comma is a decimal point where it does not separate cells.
   double number(std::string_view text, LandmarkColumn column) const {
+    std::string with_point(text);
+    if (delimiter_ != ',' && text.find('.') == std::string_view::npos)
+      std::ranges::replace(with_point, ',', '.');
     double value = 0.0;
-    const char* const end = text.data() + text.size();
-    const auto result = std::from_chars(text.data(), end, value);
+    const char* const end = with_point.data() + with_point.size();
+    const auto result = std::from_chars(with_point.data(), end, value);
     if (text.empty() || result.ec != std::errc{} || result.ptr != end || !std::isfinite(value))
-      refuse(fmt::format("{} '{}' is no finite number", kLandmarkColumnNames[column],
-                         text.substr(0, 40)));
-    return value;
+      refuse(fmt::format("{} '{}' is no finite number", name_of(column), text.substr(0, 40)));
+    const double unit_m = headings_->at(column)->unit_m;
+    return unit_m == 1.0 ? value : unit_m * value;
   }
 
   double coordinate(const std::vector<std::string_view>& cells, LandmarkColumn column) const {
     const double value = number(cell(cells, column), column);
     if (std::abs(value) > kFarthestCoordinateM)
-      refuse(fmt::format("{} {} is farther than 1e8 m from the origin",
-                         kLandmarkColumnNames[column], value));
+      refuse(fmt::format("{} {} is farther than 1e8 m from the origin", name_of(column), value));
     const bool is_far =
         !rows_.empty() &&
-        std::abs(value - rows_.front().landmark.position_m(column)) > kWidestSurveyM;
+        std::abs(value - rows_.front().landmark.position_m(static_cast<int>(column))) >
+            kWidestSurveyM;
     if (is_far)
-      refuse(fmt::format("{} {} is farther than 200 km from the first row's",
-                         kLandmarkColumnNames[column], value));
+      refuse(
+          fmt::format("{} {} is farther than 200 km from the first row's", name_of(column), value));
     return value;
   }
 
@@ -146,32 +159,31 @@ class LandmarkTable {
     if (text.empty()) return std::nullopt;
     const double value = number(text, column);
     if (!(value >= 0.0 && value <= most))
-      refuse(
-          fmt::format("{} {} is not within 0 and {} m", kLandmarkColumnNames[column], value, most));
+      refuse(fmt::format("{} {} is not within 0 and {} m", name_of(column), value, most));
     return value;
   }
 
   model::LandmarkKind kind(const std::vector<std::string_view>& cells) const {
-    const std::string_view text = cell(cells, kKindColumn);
+    const std::string_view text = cell(cells, LandmarkColumn::kKind);
     if (text.empty() || text == "trunk") return model::LandmarkKind::kTrunk;
     if (text == "corner") return model::LandmarkKind::kCorner;
     refuse(fmt::format("kind '{}' is neither trunk nor corner", text.substr(0, 40)));
   }
 
   std::string source_;
-  double default_sigma_m_;
-  std::array<std::optional<std::size_t>, kLandmarkColumns> places_;
+  LandmarkTableOptions options_;
+  std::optional<TableHeadings> headings_;
   std::vector<LandmarkRow> rows_;
   std::uint64_t line_ = 0;
   std::size_t cells_ = 0;
-  bool is_headed_ = false;
+  char delimiter_ = ',';
 };
 
 }  // namespace
 
-std::vector<LandmarkRow> parse_landmark_table(std::string_view text, std::string_view source,
-                                              double default_sigma_m) {
-  return LandmarkTable(text, source, default_sigma_m).take();
+LandmarkRows parse_landmark_table(std::string_view text, std::string_view source,
+                                  const LandmarkTableOptions& options) {
+  return LandmarkTable(text, source, options).take();
 }
 
 std::vector<ClosePair> close_pairs(const std::vector<LandmarkRow>& rows, double distance_m) {

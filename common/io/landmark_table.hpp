@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "common/io/table_headings.hpp"
 #include "common/model/map.hpp"
 
 namespace understory::io {
@@ -22,15 +24,29 @@ struct ClosePair {
   double distance_m = 0.0;
 };
 
+/// How a table is read.
+struct LandmarkTableOptions {
+  double sigma_m = 0.1;              ///< Of a row without one, in x and in y [m].
+  std::vector<NamedColumn> columns;  ///< Columns that a person named.
+};
+
+/// What a table has.
+struct LandmarkRows {
+  std::vector<LandmarkRow> rows;
+  std::vector<std::string> passed_over;  ///< Headings of columns that were not read.
+};
+
 /// Rows of the columns x_m, y_m and, where they are there, sigma_m (standard deviation in x and in
 /// y, without correlation), dbh_m (diameter at breast height) and kind (trunk or corner), in any
-/// order. An empty cell is `default_sigma_m`, no diameter, a trunk. Empty lines and lines that
-/// start with # are passed over. Throws DataError with `source` and line for any other column, a
-/// row of another number of cells, what is no finite number, coordinates beyond 1e8 m or farther
-/// than 200 km from the first row's, a sigma that is not within 0 (exclusive) and 1 km, a diameter
-/// that is not within 0 and 20 m, an unknown kind, and where there is no row.
-std::vector<LandmarkRow> parse_landmark_table(std::string_view text, std::string_view source,
-                                              double default_sigma_m);
+/// order and under the headings and units of table_headings.hpp; other columns are passed over and
+/// told. Cells are separated by semicolons, tabs or commas; a decimal comma is read where it does
+/// not separate. An empty cell is `sigma_m`, no diameter, a trunk. Empty lines and lines that start
+/// with # are passed over. Throws DataError with `source` and line for headings that are not
+/// recognised, a row of another number of cells, what is no finite number, coordinates beyond 1e8 m
+/// or farther than 200 km from the first row's, a sigma that is not within 0 (exclusive) and 1 km,
+/// a diameter that is not within 0 and 20 m, an unknown kind, and where there is no row.
+LandmarkRows parse_landmark_table(std::string_view text, std::string_view source,
+                                  const LandmarkTableOptions& options);
 
 /// All pairs of landmarks nearer to each other than `distance_m`, in order of their indices.
 std::vector<ClosePair> close_pairs(const std::vector<LandmarkRow>& rows, double distance_m);

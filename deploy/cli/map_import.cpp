@@ -1,5 +1,6 @@
 // `understory map import`: maps from surveys and drives into a map file.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -25,6 +26,7 @@ struct MapImportOptions {
   std::string source;
   std::string out;
   std::string name;
+  std::string columns;
   std::uint32_t map_id = 0;  ///< 0 = the next free one.
   double sigma_m = 0.1;
   double near_m = 0.1;
@@ -55,9 +57,21 @@ void report_close_pairs(const std::string& source, const std::vector<io::Landmar
                pairs.size(), near_m);
 }
 
+std::vector<io::NamedColumn> named_columns(const MapImportOptions& options) {
+  try {
+    return io::parse_named_columns(options.columns);
+  } catch (const std::invalid_argument& error) {
+    wrong_usage(fmt::format("--columns: {}", error.what()));
+  }
+}
+
 StoredMap map_of_table(const MapImportOptions& options) {
-  const auto rows = io::parse_landmark_table(io::read_whole_file(options.source), options.source,
-                                             options.sigma_m);
+  const auto [rows, passed_over] =
+      io::parse_landmark_table(io::read_whole_file(options.source), options.source,
+                               {options.sigma_m, named_columns(options)});
+  if (!passed_over.empty())
+    fmt::print(stderr, "{}: columns that were not read: {}\n", options.source,
+               fmt::join(passed_over, ", "));
   report_close_pairs(options.source, rows, options.near_m);
   StoredMap map;
   map.map_id = options.map_id;
@@ -187,10 +201,13 @@ void add_map_import(CLI::App& map) {
   const auto options = std::make_shared<MapImportOptions>();
   command
       ->add_option("source", options->source,
-                   "CSV with the columns x_m,y_m[,sigma_m][,dbh_m][,kind], or an LCM log with the "
-                   "mapper's output")
+                   "CSV with the columns x_m,y_m[,sigma_m][,dbh_m][,kind] (or easting, northing, "
+                   "'BHD [cm]' and the like), or an LCM log with the mapper's output")
       ->required();
   command->add_option("--out", options->out, "The map file; made, or added to")->required();
+  command->add_option("--columns", options->columns,
+                      "Which column is what, where the headings do not say it: "
+                      "x=HEADING,y=HEADING,dbh_cm=HEADING,sigma_m=HEADING,kind=HEADING");
   command
       ->add_option("--sigma-m", options->sigma_m,
                    "[m] Standard deviation in x and in y where the table has no sigma_m")

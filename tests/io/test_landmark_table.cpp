@@ -9,7 +9,7 @@ using Catch::Matchers::Contains;
 namespace {
 
 std::vector<io::LandmarkRow> parse(const std::string& text) {
-  return io::parse_landmark_table(text, "stems.csv", 0.2);
+  return io::parse_landmark_table(text, "stems.csv", {0.2, {}}).rows;
 }
 
 }  // namespace
@@ -38,10 +38,16 @@ TEST_CASE("what is no table of landmarks is refused with its line", "[io]") {
            {"", "stems.csv: ", "no heading"},
            {"\n\n", "stems.csv: ", "no heading"},
            {"x_m,y_m\n", "stems.csv: ", "no landmark"},
-           {"1,2\n3,4\n", "line 1", "unknown column '1'"},
-           {"x_m,y_m,height_m\n1,2,3\n", "line 1", "unknown column 'height_m'"},
+           {"1,2\n3,4\n", "line 1", "no column for x"},
+           {"x_m,northig\n1,2\n", "line 1", "nearest is 'northig' (--columns y=northig)"},
+           {"x,y,dbh\n1,2,30\n", "line 1", "column 'dbh' has no unit"},
+           {"x,y,dbh [inch]\n1,2,3\n", "line 1", "the unit 'inch' is none of m, cm, mm"},
+           {"lon,lat\n8.1,50.2\n", "line 1", "column 'lon' is in degrees"},
+           {"x,y\n1,5,2\n", "line 2", "3 cells"},
+           {"x;y\n1.234,5;2\n", "line 2", "x_m '1.234,5' is no finite number"},
+           {"\xFF\xFEx", "stems.csv: ", "UTF-16"},
            {"x_m,x_m\n1,2\n", "line 1", "comes twice"},
-           {"x_m,dbh_m\n1,2\n", "line 1", "no column y_m"},
+           {"x_m,dbh_m\n1,2\n", "line 1", "no column for y"},
            {"x_m,y_m\n1\n", "line 2", "1 cells, the heading has 2"},
            {"x_m,y_m\n1,2,3\n", "line 2", "3 cells"},
            {"x_m,y_m\n1,2\n1,two\n", "line 3", "y_m 'two'"},
@@ -74,4 +80,42 @@ TEST_CASE("pairs that stand close together are found", "[io]") {
   CHECK(pairs[2].first == 3);
   CHECK(io::close_pairs(rows, 0.01).empty());
   CHECK(io::close_pairs(rows, 0.0).empty());
+}
+
+TEST_CASE("tables of surveyors are read as they write them", "[io]") {
+  const std::string rows = "\n17;\"Eiche; alt\";401234,567;5654321,001;42,5\n";
+  for (const std::string& heading : {std::string("Nr;Baumart;Rechtswert;Hochwert;BHD [cm]"),
+                                     std::string("id;species;Easting;NORTHING;dbh_cm"),
+                                     std::string("id;species;utm east;utm_north;Diameter (cm)"),
+                                     std::string("id;species;X [m];Y (m);dbh cm")}) {
+    CAPTURE(heading);
+    const auto read = io::parse_landmark_table(heading + rows, "stems.csv", {0.2, {}});
+    REQUIRE(read.rows.size() == 1);
+    const model::MapLandmark& one = read.rows.front().landmark;
+    CHECK(one.position_m == Eigen::Vector2d(401234.567, 5654321.001));
+    CHECK(one.radius_m == Approx(0.2125));
+    CHECK(read.passed_over.size() == 2);
+  }
+
+  const auto tabs = parse("x\ty\tsigma_mm\n1,5\t-2.25\t50\n");
+  CHECK(tabs.front().landmark.position_m == Eigen::Vector2d(1.5, -2.25));
+  CHECK(tabs.front().landmark.covariance_m2(0, 0) == Approx(0.0025));
+}
+
+TEST_CASE("a person says which column is what", "[io]") {
+  const auto named = io::parse_named_columns("x=position east,y=b,dbh_mm=D");
+  const std::string text = "position east,b,D,x,dbh_m\n1,2,300,7,8\n";
+  const auto read = io::parse_landmark_table(text, "stems.csv", {0.2, named});
+  CHECK(read.rows.front().landmark.position_m == Eigen::Vector2d(1.0, 2.0));
+  CHECK(read.rows.front().landmark.radius_m == Approx(0.15));
+  CHECK(read.passed_over == std::vector<std::string>{"x", "dbh_m"});
+
+  CHECK_THROWS_WITH(io::parse_landmark_table("x,y\n1,2\n", "stems.csv", {0.2, named}),
+                    Contains("line 1") && Contains("no column 'position east' (--columns)"));
+  for (const char* wrong : {"x", "x=", "=a", "height_m=h", "x=a,,y=b"})
+    CHECK_THROWS_AS(io::parse_named_columns(wrong), std::invalid_argument);
+  CHECK(io::parse_named_columns("").empty());
+  const auto unitless = io::parse_named_columns("dbh=D");
+  CHECK_THROWS_WITH(io::parse_landmark_table("x,y,D\n1,2,3\n", "s.csv", {0.2, unitless}),
+                    Contains("has no unit"));
 }

@@ -1,0 +1,56 @@
+// Headings of surveyors' tables: which column is what, and in which unit.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace understory::io {
+
+/// What a column of a table of landmarks can be.
+enum class LandmarkColumn : std::size_t { kX, kY, kSigma, kDiameter, kKind };
+inline constexpr std::size_t kLandmarkColumns = 5;
+
+/// A column that a person named: `role` as in --columns (x, y, sigma_m, dbh_cm, kind, ...), and the
+/// heading that it has in the file.
+struct NamedColumn {
+  std::string role;
+  std::string heading;
+};
+
+/// Where a column stands, and what its numbers are multiplied by to be metres.
+struct FoundColumn {
+  std::size_t place = 0;
+  double unit_m = 1.0;
+};
+
+/// The columns of a table.
+struct TableHeadings {
+  std::array<std::optional<FoundColumn>, kLandmarkColumns> columns;
+  std::vector<std::string> passed_over;  ///< Headings of no column that is known.
+
+  /// Where that column stands; none where the table has none.
+  const std::optional<FoundColumn>& at(LandmarkColumn column) const {
+    return columns[static_cast<std::size_t>(column)];
+  }
+};
+
+/// Reads "x=easting,dbh_cm=BHD" as --columns has it. Throws std::invalid_argument with what is
+/// wrong.
+std::vector<NamedColumn> parse_named_columns(std::string_view text);
+
+/// Recognises headings, whatever their case, blanks and underscores: x, east, easting, rechtswert;
+/// y, north, northing, hochwert; dbh, bhd, diameter; sigma; kind. A unit stands behind: x_m, "BHD
+/// [cm]", dbh_mm. Coordinates without one are in metres; a diameter or sigma without one is
+/// refused, since nothing tells. `named` columns count instead of what is recognised. Throws
+/// std::invalid_argument (a text for the heading's line) where x or y is missing, with the heading
+/// that is nearest; for a column that comes twice, a named one that is not there, an unknown unit,
+/// and for degrees. Cost O(headings times known ones).
+TableHeadings recognise_headings(std::span<const std::string_view> headings,
+                                 std::span<const NamedColumn> named);
+
+}  // namespace understory::io
