@@ -71,7 +71,8 @@ class PoseJudge {
 /// What HEALTH of all services says, and when it was first said.
 class Listener {
  public:
-  Listener(harness::SensorChain& chain, Culprit culprit) : chain_(chain), culprit_(culprit) {}
+  Listener(harness::SensorChain& chain, const MountingFault& fault)
+      : chain_(chain), culprit_(fault.culprit), is_late_(fault.late_s != 0.0) {}
 
   void listen(double at_s) {
     for (const std::string& service : chain_.services()) {
@@ -87,8 +88,9 @@ class Listener {
     const std::string what = fmt::format("{} {} {}", service, reason.reason, reason.channel);
     if (!verdict_.heard.try_emplace(what, at_s).second || reason.reason != "miscalibrated") return;
 
-    // A clock is either's; where no laser is late nobody's has been wrong.
-    if (culprit_ != Culprit::kNone && culprit_of(reason.channel) == culprit_) {
+    const bool is_clock = reason.channel.empty();
+    if (is_clock ? is_late_
+                 : culprit_ != Culprit::kNone && culprit_of(reason.channel) == culprit_) {
       if (has_named()) return;
       verdict_.named_s = at_s;
       verdict_.named_as = service + ": " + reason.channel;
@@ -99,6 +101,7 @@ class Listener {
 
   harness::SensorChain& chain_;
   Culprit culprit_;
+  bool is_late_;  ///< Without a channel HEALTH means a clock.
   MountingVerdict verdict_;
 };
 
@@ -151,7 +154,7 @@ ReadingTape record_readings(double length_m, std::uint64_t seed) {
 MountingVerdict drive(const ReadingTape& tape, const MountingFault& fault,
                       const std::filesystem::path& config_dir) {
   harness::SensorChain chain(harness::services_of(config_dir), config_dir);
-  Listener listener(chain, fault.culprit);
+  Listener listener(chain, fault);
   PoseJudge slam(tape.truth);
   PoseJudge filter(tape.truth);
   chain.watch<model::SlamPose>("SLAM_POSE", [&](const model::SlamPose& pose) {
