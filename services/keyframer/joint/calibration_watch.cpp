@@ -61,13 +61,15 @@ void CalibrationWatch::add(const model::Odometry& increment) {
   note_sensors(increment);
 }
 
-/// Odometry that goes on without the IMU, or with it again, is another measurement: what was wrong
-/// with the one is not wrong with the other.
+/// Odometry that goes on without IMU or wheels, or with them again, is another measurement: what
+/// was wrong with the one is not wrong with the other.
 void CalibrationWatch::note_sensors(const model::Odometry& increment) {
-  const bool is_other = increment.inertial.has_value() != has_inertial_;
+  const bool has_inertial = increment.inertial.has_value();
+  const bool is_other = has_inertial != has_inertial_ || increment.has_wheels != has_wheels_;
   other_increments_ = is_other ? other_increments_ + 1 : 0;
   if (other_increments_ < kOtherIncrements) return;
-  has_inertial_ = !has_inertial_;
+  has_inertial_ = has_inertial;
+  has_wheels_ = increment.has_wheels;
   other_increments_ = 0;
   minutes_ = Memory(kMinutes_s);
   seconds_ = Memory(kSeconds_s);

@@ -58,7 +58,8 @@ class CalibrationWatch {
   static void archive(Archive& a, Self& self) {
     a(self.odometry_, self.waiting_, self.wheels_since_, self.due_utime_, self.last_utime_,
       self.last_start_utime_, self.minutes_, self.seconds_, self.jump_, self.contradicts_,
-      self.jumped_utime_, self.has_jumped_, self.has_inertial_, self.other_increments_);
+      self.jumped_utime_, self.has_jumped_, self.has_inertial_, self.has_wheels_,
+      self.other_increments_);
   }
 
  private:
@@ -123,6 +124,7 @@ class CalibrationWatch {
   std::optional<model::Utime> jumped_utime_;
   bool has_jumped_ = false;
   bool has_inertial_ = true;  ///< Of the increments that are compared.
+  bool has_wheels_ = true;
   int other_increments_ = 0;  ///< In a row that are otherwise.
 };
 
