@@ -86,7 +86,9 @@ class Listener {
  private:
   void hear(const std::string& service, const reason_count_t& reason, double at_s) {
     const std::string what = fmt::format("{} {} {}", service, reason.reason, reason.channel);
-    if (!verdict_.heard.try_emplace(what, at_s).second || reason.reason != "miscalibrated") return;
+    // A sensor whose messages are refused one after another is named by that.
+    const bool names = reason.reason == "miscalibrated" || reason.reason == "input_refused";
+    if (!verdict_.heard.try_emplace(what, at_s).second || !names) return;
 
     const bool is_clock = reason.channel.empty();
     if (is_clock ? is_late_

@@ -36,9 +36,10 @@ struct PoseScore {
   bool is_inside() const { return 100 * outside <= poses; }
 };
 
-/// What one drive showed. Seconds count from the start of motion; before it they are negative.
+/// What one drive showed: `miscalibrated` names a sensor, and so does `input_refused`. Seconds
+/// count from the start of motion; before it they are negative.
 struct MountingVerdict {
-  std::optional<double> named_s;         ///< HEALTH said `miscalibrated` of the right sensor.
+  std::optional<double> named_s;         ///< HEALTH said it of the right sensor.
   std::string named_as;                  ///< "process: channel".
   std::map<std::string, double> blamed;  ///< Other sensors that were called `miscalibrated`, when.
   PoseScore slam;                        ///< Until it was named.
