@@ -47,6 +47,7 @@ void add_eval_command(CLI::App& parent) {
   misstated::add_misstated_experiment(eval);
   wheels::add_wheels_experiment(eval);
   gaps::add_gaps_experiment(eval);
+  mountings::add_mountings_experiment(eval);
   reliability::add_reliability_experiment(eval);
   few_landmarks::add_few_landmarks_experiment(eval);
   closures::add_closures_experiment(eval);

@@ -75,6 +75,11 @@ namespace closures {
 void add_closures_experiment(CLI::App& eval);
 }  // namespace closures
 
+namespace mountings {
+/// Wrong mountings, units and signs of sensors.
+void add_mountings_experiment(CLI::App& eval);
+}  // namespace mountings
+
 namespace gaps {
 /// Processes that hang and sensors that are silent.
 void add_gaps_experiment(CLI::App& eval);

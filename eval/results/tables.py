@@ -15,6 +15,7 @@ import render  # noqa: E402
 import render_closures  # noqa: E402
 import render_existence  # noqa: E402
 import render_gaps  # noqa: E402
+import render_mountings  # noqa: E402
 import render_partition  # noqa: E402
 import render_places  # noqa: E402
 import render_reliability  # noqa: E402
@@ -95,6 +96,7 @@ SECTIONS = (
     ("reliability-load-0", "Real processes while messages and processes are late", None, render_reliability.reliability),
     ("reliability-load-8", "The same on a busy computer", None, render_reliability.reliability),
     ("gaps", "Processes that hang, sensors that are silent", None, render_gaps.gaps),
+    ("mountings", "Wrong mountings, units and signs of sensors", None, render_mountings.mountings),
     ("misstated", "Sensors that are not as stated", None, render.misstated),
     ("victoria-park", "A real drive: Victoria Park", "stated figures of the batch solution", render.victoria_park),
     ("frontend-chain", "From raw sensors: simulated drives", None, _figures),

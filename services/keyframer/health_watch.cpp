@@ -6,6 +6,11 @@
 namespace understory::keyframer {
 namespace {
 
+/// By so much a wrong sensor must explain the ways better than wrong wheels.
+constexpr double kSensorSigmas = 6.0;
+/// Up to here the watch's linear model holds [rad].
+constexpr double kLinearYaw_rad = 0.15;
+
 /// Whether it is true by the last minutes, or by the last seconds.
 template <class Judge>
 bool either(const InputQuality& quality, const Judge& judge) {
@@ -76,8 +81,10 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
             "scans are stamped late or early by a constant against odometry: a clock", "",
             bus::Condition(parameters.misstated)},
       scale_{wire::Reason::kMiscalibrated,
-             "the way by wheels is longer or shorter than by landmarks: wheel scale", "ODOMETRY",
-             bus::Condition(parameters.misstated)} {}
+             "the way by wheels is longer or shorter than by landmarks: wheel scale, or the unit "
+             "of the "
+             "laser's ranges",
+             "ODOMETRY", bus::Condition(parameters.misstated)} {}
 
 void HealthWatch::judge(const InputQuality& quality) {
   misstated_.condition.add(quality.is_noise_misstated);
@@ -88,11 +95,19 @@ void HealthWatch::judge(const InputQuality& quality) {
   const auto is_off = [this](double error, double sigma, double most) {
     return std::abs(error) > most && std::abs(error) > parameters_.calibration_sigmas * sigma;
   };
+  // Where the turns do not agree the ways say nothing of a mounting or a scale.
+  const auto turns_agree = [this](const CalibrationError& error) {
+    return error.turn_chi2 <= parameters_.max_turn_chi2;
+  };
   mounting_.condition.add(either(quality, [&](const CalibrationError& error) {
     const double most_m = parameters_.max_place_error_m;
-    return is_off(error.yaw_rad, error.yaw_sigma_rad, parameters_.max_yaw_error_rad) ||
-           is_off(error.place_m.x(), error.place_sigma_m.x(), most_m) ||
-           is_off(error.place_m.y(), error.place_sigma_m.y(), most_m);
+    const bool is_one = is_off(error.yaw_rad, error.yaw_sigma_rad, parameters_.max_yaw_error_rad) ||
+                        is_off(error.place_m.x(), error.place_sigma_m.x(), most_m) ||
+                        is_off(error.place_m.y(), error.place_sigma_m.y(), most_m);
+    const bool is_large = std::abs(error.mount_yaw_rad) > parameters_.max_yaw_error_rad ||
+                          error.mount_place_m.cwiseAbs().maxCoeff() > most_m;
+    const bool is_either = is_large && error.sensor_sigmas > kSensorSigmas;
+    return turns_agree(error) && (is_one || is_either);
   }));
   late_.condition.add(either(quality, [&](const CalibrationError& error) {
     const auto moves = [&](double speed, double most) {
@@ -102,7 +117,9 @@ void HealthWatch::judge(const InputQuality& quality) {
            moves(error.rate_rad_s, parameters_.max_yaw_error_rad);
   }));
   scale_.condition.add(either(quality, [&](const CalibrationError& error) {
-    return is_off(error.scale, error.scale_sigma, parameters_.max_scale_error);
+    // Of a large yaw the cosine would pass for a scale.
+    return turns_agree(error) && std::abs(error.yaw_rad) < kLinearYaw_rad &&
+           is_off(error.scale, error.scale_sigma, parameters_.max_scale_error);
   }));
 }
 

@@ -37,6 +37,12 @@ struct CalibrationError {
   /// The sensor beside its configured place, ahead and to the left.
   Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
   Eigen::Vector2d place_sigma_m = Eigen::Vector2d::Ones();
+  /// The same where clock and wheels are right.
+  double mount_yaw_rad = 0.0;
+  Eigen::Vector2d mount_place_m = Eigen::Vector2d::Zero();
+  /// By how many sigmas another mounting or another clock of the sensor explains the ways better
+  /// than another wheel scale does. In an even curve it cannot be told which of the two it is.
+  double sensor_sigmas = 0.0;
   double scale = 0.0;  ///< Share by which wheels measure a longer way.
   double scale_sigma = 1.0;
   /// Stamps of scans after the time at which odometry says that they were made; where rate and

@@ -123,7 +123,7 @@ class LidarImuInputAdapter : public bus::Adapter {
   void load(const std::string& state) override {
     stage_->load(state);
     show_silence();
-    show_gravity();
+    show_calibration();
   }
 
  private:
@@ -146,13 +146,21 @@ class LidarImuInputAdapter : public bus::Adapter {
   void publish(const InputResults& results) {
     for (const InputResult& result : results) std::visit(*publishers_, result);
     show_silence();
-    show_gravity();
+    show_calibration();
   }
 
-  /// As long as the IMU at rest does not measure gravity as it must.
-  void show_gravity() {
-    const std::string text = stage_->gravity().text();
-    bus::WatchedCondition watched{wire::Reason::kMiscalibrated, text, channels_.raw_imu,
+  /// As long as a sensor contradicts gravity, the ground or the others.
+  void show_calibration() {
+    const MotionAgreement& agreement = stage_->agreement();
+    const std::string by_motion = agreement.text();
+    const bool is_of_imu = MotionAgreement::is_of_imu(agreement.odd());
+    const std::string by_gravity = stage_->gravity().text();
+    show_miscalibrated(channels_.raw_imu, by_gravity.empty() && is_of_imu ? by_motion : by_gravity);
+    show_miscalibrated(channels_.raw_wheels, is_of_imu ? "" : by_motion);
+    show_miscalibrated(channels_.raw_sweep, stage_->laser().text());
+  }
+  void show_miscalibrated(const std::string& channel, const std::string& text) {
+    bus::WatchedCondition watched{wire::Reason::kMiscalibrated, text, channel,
                                   bus::Condition({1, 1})};
     watched.condition.add(!text.empty());
     node_->show(watched);

@@ -155,6 +155,8 @@ void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
   table.add("lidar.times_from_azimuth", parameters.lidar.times_from_azimuth,
             {"none", "clockwise", "counterclockwise"},
             "Times for sweeps that have none: how the laser rotates, seen from above.");
+  table.add("lidar.turns", parameters.lidar.turns, {"any", "clockwise", "counterclockwise"},
+            "How its points come, seen from above in its own frame; \"any\" is not checked.");
   table.add("lidar.revolution_s", parameters.lidar.revolution_s, {0.001, 1.0}, "s",
             "Time of one revolution, for these.");
   table.add("lidar.min_range_m", parameters.lidar.min_range_m, {0.0, 100.0}, "m",

@@ -35,6 +35,11 @@ class GravityCheck {
   double scale() const { return scale_; }
   /// Of the latest quiet samples.
   GravityVerdict verdict() const { return verdict_; }
+  /// Whether what it measures is no level of the vehicle.
+  bool is_useless() const {
+    return verdict_ != GravityVerdict::kUnknown && verdict_ != GravityVerdict::kRight &&
+           verdict_ != GravityVerdict::kInG;
+  }
   /// Their mean force, frame sensor.
   const Eigen::Vector3d& mean_mps2() const { return mean_mps2_; }
   /// For a person: what is wrong, and the setting that mends it; empty where nothing is.

@@ -85,6 +85,8 @@ LidarImuInput::LidarImuInput(const LidarImuInputParameters& parameters)
       order_(parameters.fault),
       guard_(parameters.fault, parameters.imu, parameters.expected),
       gravity_(parameters.imu.mount, parameters.standstill),
+      agreement_(parameters),
+      laser_(parameters.lidar),
       motion_(parameters),
       raw_poses_(parameters.output.raw_pose_period_s) {}
 
@@ -125,24 +127,47 @@ InputResults LidarImuInput::add(RawReading raw) {
   return out;
 }
 
+bool LidarImuInput::leaves_out(Sensor sensor) const {
+  const bool is_by_motion = agreement_.is_useless();
+  const bool is_of_imu = MotionAgreement::is_of_imu(agreement_.odd());
+  if (sensor == Sensor::kImu) return gravity_.is_useless() || (is_by_motion && is_of_imu);
+  return sensor == Sensor::kWheels && is_by_motion && !is_of_imu;
+}
+
+/// What was made of the samples so far is wrong.
+void LidarImuInput::begin_motion_anew() {
+  motion_ = MotionEstimator(parameters_);
+  if (increment_end_) motion_.begin(*increment_end_);
+}
+
+void LidarImuInput::note_left_out() {
+  const bool imu = leaves_out(Sensor::kImu);
+  const bool wheels = leaves_out(Sensor::kWheels);
+  if (imu == left_out_imu_ && wheels == left_out_wheels_) return;
+  left_out_imu_ = imu;
+  left_out_wheels_ = wheels;
+  begin_motion_anew();
+}
+
 void LidarImuInput::use(const model::ImuSample& raw, InputResults& out) {
   // What is wrong with it?
   std::vector<InputFault> faults;
   const bool frozen = guard_.is_frozen(raw, faults);
   if (!frozen && gravity_.add(raw)) {
     // All motion so far was of a wrong unit: it begins anew.
-    motion_ = MotionEstimator(parameters_);
-    if (increment_end_) motion_.begin(*increment_end_);
+    begin_motion_anew();
     out.emplace_back(InputFault{InputFaultKind::kUnit, channel_of(Sensor::kImu),
                                 "the acceleration is in g and taken times 9.81: its driver must "
                                 "send m/s^2"});
   }
   model::ImuSample sample = raw;
   sample.specific_force_mps2 *= gravity_.scale();
+  if (!frozen && !gravity_.is_useless()) agreement_.add(sample);
   const bool saturated = guard_.is_saturated(sample, faults);
   const auto utime = frozen ? std::nullopt : guard_.admit(Sensor::kImu, raw.utime, faults);
   report(faults, out);
-  if (!utime) return;
+  note_left_out();
+  if (!utime || left_out_imu_) return;
 
   if (saturated) {
     // It is a bound, no measurement. Over a bump the samples beside it are joined, with more noise;
@@ -168,6 +193,8 @@ void LidarImuInput::use(const model::WheelSample& raw, InputResults& out) {
   if (!utime) return;
   model::WheelSample sample = raw;
   sample.utime = *utime;
+  agreement_.add(sample);
+  if (left_out_wheels_) return;
   motion_.add_wheels(sample);
   out.emplace_back(sample);
 }
@@ -290,6 +317,7 @@ void LidarImuInput::end_increment(model::Utime utime, InputResults& out) {
   if (utime <= *increment_end_) return;
 
   if (auto increment = motion_.increment(*increment_end_, utime)) {
+    laser_.travel(increment->from_T_to.translation().norm());
     out.emplace_back(*std::move(increment));
     if (auto pose = raw_poses_.take(motion_.raw_pose(), true)) out.emplace_back(*pose);
     if (auto level = motion_.rest_news(utime)) out.emplace_back(*level);
@@ -331,11 +359,14 @@ void LidarImuInput::release_sweep(model::PointSweep raw, Sensor sensor, model::U
   const MotionHistory& history = by_filter.empty() ? motion_.history() : by_filter;
 
   const bool has_times = raw.has_times;
+  if (sensor == Sensor::kSweep) laser_.add_raw(raw);
   const SensorMount& mount =
       sensor == Sensor::kScan ? parameters_.planar.mount : parameters_.lidar.mount;
   DeskewedSweep result = deskew(std::move(raw), stamp, history, mount);
   // Without an IMU the attitude is not known, and the filter's motion has none.
   if (!motion_.attitude() || !by_filter.empty()) result.sweep.attitude.reset();
+
+  if (sensor == Sensor::kSweep) laser_.add(result.sweep);
 
   ++counters_.sweeps;
   if (!by_filter.empty() && result.had_motion) ++counters_.sweeps_by_filter;

@@ -23,6 +23,8 @@
 #include "services/lidar_imu_input/filter_motion.hpp"
 #include "services/lidar_imu_input/gravity_check.hpp"
 #include "services/lidar_imu_input/input_guard.hpp"
+#include "services/lidar_imu_input/laser_check.hpp"
+#include "services/lidar_imu_input/motion_agreement.hpp"
 #include "services/lidar_imu_input/motion_estimator.hpp"
 #include "services/lidar_imu_input/output_pacing.hpp"
 #include "services/lidar_imu_input/raw_reading.hpp"
@@ -84,8 +86,14 @@ class LidarImuInput {
   /// sensors at any temperature: the stage starts anew.
   static constexpr double kLongestPause_s = 600.0;
 
+  /// Whether the sensor is left out of the motion, as what it measures is certainly wrong.
+  bool leaves_out(Sensor sensor) const;
   /// What the IMU shows of gravity.
   const GravityCheck& gravity() const { return gravity_; }
+  /// Whether IMU and wheels measure one motion.
+  const MotionAgreement& agreement() const { return agreement_; }
+  /// Whether the laser sees the ground where it must.
+  const LaserCheck& laser() const { return laser_; }
   /// Whether a sensor that must send does not.
   bool is_silent(Sensor sensor) const { return guard_.is_silent(sensor); }
   const InputCounters& counters() const { return counters_; }  ///< Since the first start.
@@ -95,9 +103,10 @@ class LidarImuInput {
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.time_base_, self.order_, self.guard_, self.gravity_, self.motion_, self.filter_motion_,
-      self.counters_, self.queue_, self.increment_end_, self.raw_poses_, self.calibration_,
-      self.was_saturated_);
+    a(self.time_base_, self.order_, self.guard_, self.gravity_, self.agreement_, self.laser_,
+      self.motion_, self.filter_motion_, self.counters_, self.queue_, self.increment_end_,
+      self.raw_poses_, self.calibration_, self.was_saturated_, self.left_out_imu_,
+      self.left_out_wheels_);
   }
 
  private:
@@ -106,6 +115,8 @@ class LidarImuInput {
   void use(const model::GnssFix& raw, InputResults& out);
   void use(model::PointSweep sweep, InputResults& out);
   void use(const model::PlanarScan& raw, InputResults& out);
+  void begin_motion_anew();
+  void note_left_out();
   void wait(WaitingSweep waiting, InputResults& out);
   void use_ready(InputResults& out, bool everything);
   void settle(InputResults& out, bool everything);
@@ -119,6 +130,8 @@ class LidarImuInput {
   ArrivalOrder order_;
   InputGuard guard_;
   GravityCheck gravity_;
+  MotionAgreement agreement_;
+  LaserCheck laser_;
   MotionEstimator motion_;
   FilterMotion filter_motion_;
   InputCounters counters_;
@@ -127,6 +140,8 @@ class LidarImuInput {
   RawPosePacer raw_poses_;
   CalibrationWatch calibration_;
   bool was_saturated_ = false;  ///< The latest sample of the IMU; it was left out.
+  bool left_out_imu_ = false;   ///< See leaves_out().
+  bool left_out_wheels_ = false;
 };
 
 }  // namespace understory::lidar_imu_input

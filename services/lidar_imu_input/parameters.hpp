@@ -77,6 +77,8 @@ struct DeskewParameters {
   double revolution_s = 0.1;  ///< Time of one revolution, for sweeps without times.
   /// Sweeps without times get them from the azimuth: "none", "clockwise", "counterclockwise".
   std::string times_from_azimuth = "none";
+  /// How its points come, seen from above in its own frame: "any" is not checked.
+  std::string turns = "any";
   double min_range_m = 0.0;  ///< Nearer points are on the vehicle itself.
 };
 

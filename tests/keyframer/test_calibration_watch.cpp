@@ -151,6 +151,23 @@ TEST_CASE("Straight on, a changing speed shows late scans and a constant one doe
   }
 }
 
+TEST_CASE("In an even curve a wrong sensor is told from wrong wheels, yaw and place alike",
+          "[calibration]") {
+  const auto circling = [](int) { return geometry::SE2::Exp({0.3, 0.0, 0.02}); };
+  const double yaw = 3.0 * std::numbers::pi / 180.0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const CalibrationError turned = after(20.0, {.yaw_rad = yaw}, seed, +circling);
+    CHECK(turned.sensor_sigmas > 8.0);
+    // Neither number is known alone.
+    CHECK(std::abs(turned.yaw_rad) < 5.0 * turned.yaw_sigma_rad);
+    CHECK(after(20.0, {.place_m = {0.8, 0.0}}, seed, +circling).sensor_sigmas > 8.0);
+
+    CHECK(after(20.0, {}, seed, +circling).sensor_sigmas < 5.0);
+    CHECK(after(20.0, {.scale = 0.05}, seed, +circling).sensor_sigmas < 5.0);
+    CHECK(after(20.0, {.scale = 0.05}, seed).sensor_sigmas < 5.0);
+  }
+}
+
 TEST_CASE("What a wrong calibration makes of a motion is its derivative", "[calibration]") {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> any(-1.0, 1.0);

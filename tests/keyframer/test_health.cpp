@@ -162,6 +162,22 @@ TEST_CASE("What landmarks and odometry contradict each other in is named", "[hea
   auto longer = none;
   longer.scale = 0.03;
   CHECK(shows(after(longer), wire::Reason::kMiscalibrated, "ODOMETRY"));
+  // In an even curve the sensor's mounting as a whole; nothing where the turns do not agree.
+  auto curve = none;
+  curve.sensor_sigmas = 12.0;
+  CHECK_FALSE(after(curve).is_miscalibrated());
+  curve.mount_yaw_rad = 0.05;
+  CHECK(shows(after(curve), wire::Reason::kMiscalibrated, "LANDMARKS"));
+  curve.sensor_sigmas = 6.0;
+  CHECK_FALSE(after(curve).is_miscalibrated());
+  auto wrong_gyro = none;
+  wrong_gyro.turn_chi2 = 20.0;
+  wrong_gyro.yaw_rad = wrong_gyro.place_m.x() = wrong_gyro.scale = 0.1;
+  CHECK_FALSE(after(wrong_gyro).is_miscalibrated());
+  auto backwards = none;  // Its cosine is no scale.
+  backwards.yaw_rad = 0.5;
+  backwards.scale = -0.2;
+  CHECK_FALSE(shows(after(backwards), wire::Reason::kMiscalibrated, "ODOMETRY"));
   HealthWatch jumped;
   for (int k = 0; k < 20; ++k) jumped.add({}, {}, {}, {false, none, none, k == 10});
   CHECK(shows(jumped, wire::Reason::kDiverged, ""));

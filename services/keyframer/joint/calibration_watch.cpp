@@ -33,8 +33,18 @@ constexpr model::Utime kKept_us = 10'000'000;
 /// Time before and after a motion over which a twist is taken [us]. None of it is within the
 /// motion: the error of its wheels would pass for lateness.
 constexpr model::Utime kTwist_us = 200'000;
+/// Increments in a row by other sensors than before, after which they are others.
+constexpr int kOtherIncrements = 10;
+/// Less is a standstill.
+constexpr double kStands_m = 0.05;
+constexpr double kStands_rad = 0.02;
 /// Motions that wait for odometry.
 constexpr std::size_t kMostWaiting = 50;
+
+/// One thing is wrong at a time; the gyro's bias is unknown in any case.
+constexpr int kMountFree[] = {kYaw, kPlace, kPlace + 1, kGyroBias};
+constexpr int kClockFree[] = {kLate, kGyroBias};
+constexpr int kScaleFree[] = {kScale, kGyroBias};
 
 CalibrationMatrix prior() { return kPrior_sigma.cwiseAbs2().cwiseInverse().asDiagonal(); }
 
@@ -48,6 +58,23 @@ void CalibrationWatch::add(const model::Odometry& increment) {
   odometry_.add(increment);
   odometry_.forget_before(increment.utime - kKept_us);
   if (!increment.has_wheels) wheels_since_ = increment.utime;
+  note_sensors(increment);
+}
+
+/// Odometry that goes on without IMU or wheels, or with them again, is another measurement: what
+/// was wrong with the one is not wrong with the other.
+void CalibrationWatch::note_sensors(const model::Odometry& increment) {
+  const bool has_inertial = increment.inertial.has_value();
+  const bool is_other = has_inertial != has_inertial_ || increment.has_wheels != has_wheels_;
+  other_increments_ = is_other ? other_increments_ + 1 : 0;
+  if (other_increments_ < kOtherIncrements) return;
+  has_inertial_ = has_inertial;
+  has_wheels_ = increment.has_wheels;
+  other_increments_ = 0;
+  minutes_ = Memory(kMinutes_s);
+  seconds_ = Memory(kSeconds_s);
+  waiting_.clear();
+  jump_.begin_anew();
 }
 
 std::optional<Eigen::Vector3d> CalibrationWatch::twist_over(model::Utime from,
@@ -178,6 +205,10 @@ void CalibrationWatch::Memory::compare_turns(const TwoMotions& motions, double o
 }
 
 void CalibrationWatch::Memory::compare_ways(const TwoMotions& motions) {
+  // Who stands measures no mounting, whatever the gyro says.
+  if (motions.by_odometry.mean.translation().norm() < kStands_m &&
+      std::abs(motions.by_landmarks.mean.theta()) < kStands_rad)
+    return;
   const WayDifference difference = way_difference(motions);
   const Eigen::Matrix2d weight = difference.covariance_m2.inverse();
   if (!weight.allFinite() || !difference.value_m.allFinite()) return;
@@ -191,6 +222,27 @@ CalibrationMatrix CalibrationWatch::Memory::covariance() const {
   return (information_ + prior()).inverse();
 }
 
+CalibrationWatch::Memory::Account CalibrationWatch::Memory::account(
+    std::span<const int> free) const {
+  const auto count = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd information(count, count);
+  Eigen::VectorXd gradient(count);
+  const CalibrationMatrix all = information_ + prior();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const int row = free[static_cast<std::size_t>(i)];
+    gradient(i) = gradient_(row);
+    for (Eigen::Index j = 0; j < count; ++j)
+      information(i, j) = all(row, free[static_cast<std::size_t>(j)]);
+  }
+
+  const Eigen::VectorXd solution = information.llt().solve(gradient);
+  Account result;
+  for (Eigen::Index i = 0; i < count; ++i)
+    result.numbers(free[static_cast<std::size_t>(i)]) = solution(i);
+  result.chi2 = gradient.dot(solution);
+  return result;
+}
+
 CalibrationError CalibrationWatch::Memory::error() const {
   const CalibrationMatrix covariance = this->covariance();
   const CalibrationNumbers estimate = covariance * gradient_;
@@ -201,6 +253,11 @@ CalibrationError CalibrationWatch::Memory::error() const {
   error.yaw_sigma_rad = sigma(kYaw);
   error.place_m = estimate.segment<2>(kPlace);
   error.place_sigma_m = sigma.segment<2>(kPlace);
+  const Account mount = account(kMountFree);
+  error.mount_yaw_rad = mount.numbers(kYaw);
+  error.mount_place_m = mount.numbers.segment<2>(kPlace);
+  const double sensor_chi2 = std::max(mount.chi2, account(kClockFree).chi2);
+  error.sensor_sigmas = std::sqrt(std::max(0.0, sensor_chi2 - account(kScaleFree).chi2));
   error.scale = estimate(kScale);
   error.scale_sigma = sigma(kScale);
   error.turn_chi2 = (turn_chi2_ + kStatedTurns) / (turns_ + kStatedTurns);

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <deque>
 #include <optional>
+#include <span>
 
 #include "common/model/detection_noise.hpp"
 #include "common/model/odometry_buffer.hpp"
@@ -57,7 +58,8 @@ class CalibrationWatch {
   static void archive(Archive& a, Self& self) {
     a(self.odometry_, self.waiting_, self.wheels_since_, self.due_utime_, self.last_utime_,
       self.last_start_utime_, self.minutes_, self.seconds_, self.jump_, self.contradicts_,
-      self.jumped_utime_, self.has_jumped_);
+      self.jumped_utime_, self.has_jumped_, self.has_inertial_, self.has_wheels_,
+      self.other_increments_);
   }
 
  private:
@@ -76,6 +78,12 @@ class CalibrationWatch {
     void forget(double passed_s);
     CalibrationError error() const;
     CalibrationMatrix covariance() const;
+    /// Estimate where only these numbers may differ from 0, and the chi^2 that it explains.
+    struct Account {
+      CalibrationNumbers numbers = CalibrationNumbers::Zero();
+      double chi2 = 0.0;
+    };
+    Account account(std::span<const int> free) const;
     const CalibrationNumbers& gradient() const { return gradient_; }
 
     template <class Archive, class Self>
@@ -99,6 +107,7 @@ class CalibrationWatch {
   std::optional<TwoMotions> two_motions(const model::ScanMotion& motion) const;
   std::optional<Eigen::Vector3d> twist_over(model::Utime from, model::Utime to) const;
   void compare(const model::ScanMotion& motion);
+  void note_sensors(const model::Odometry& increment);
 
   model::OdometryBuffer odometry_;
   std::deque<model::ScanMotion> waiting_;  ///< For the odometry after them.
@@ -106,12 +115,17 @@ class CalibrationWatch {
   model::Utime due_utime_ = 0;             ///< Ways that end before it overlap too much.
   model::Utime last_utime_ = 0;            ///< End of the last motion.
   model::Utime last_start_utime_ = 0;
-  Memory minutes_{120.0};
-  Memory seconds_{10.0};
+  static constexpr double kMinutes_s = 120.0;
+  static constexpr double kSeconds_s = 10.0;
+  Memory minutes_{kMinutes_s};
+  Memory seconds_{kSeconds_s};
   JumpWatch jump_;
   bool contradicts_ = false;
   std::optional<model::Utime> jumped_utime_;
   bool has_jumped_ = false;
+  bool has_inertial_ = true;  ///< Of the increments that are compared.
+  bool has_wheels_ = true;
+  int other_increments_ = 0;  ///< In a row that are otherwise.
 };
 
 }  // namespace understory::keyframer::joint

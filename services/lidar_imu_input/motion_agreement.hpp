@@ -1,0 +1,143 @@
+// Whether gyro, accelerometer, wheel speed and steering measure one motion, and which does not.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/model/imu.hpp"
+#include "common/model/wheels.hpp"
+#include "services/lidar_imu_input/parameters.hpp"
+
+namespace understory::lidar_imu_input {
+
+/// What may be wrong with IMU or wheels, one thing at a time.
+enum class OddOne : std::uint8_t {
+  kNone,        ///< All agree.
+  kImuYaw,      ///< The IMU is mounted at another yaw.
+  kGyroSign,    ///< Rates are turned round.
+  kGyroUnit,    ///< Rates are in degrees per second.
+  kWheelSpeed,  ///< The speed is too large, too small, or turned round.
+  kSteering,    ///< Left and right are swapped.
+};
+
+/// One account of the motion: a thing that is wrong, and by how much.
+struct MotionAccount {
+  OddOne odd = OddOne::kNone;
+  double value = 0.0;   ///< Yaw to be added [rad], or factor of the speed.
+  bool steered = true;  ///< False: the steering angle says nothing, the gyro gives all turns.
+  double chi2 = 0.0;    ///< Of all windows so far; one window counts little.
+};
+
+/// Over half a second each: the accelerometer without gravity against the change of the wheels'
+/// speed and the force towards the inside of a curve, and the gyro's turn against that by steering.
+/// With three sources the one that disagrees with the others is the culprit: each account of the
+/// motion in which one thing is wrong is tried, and believed where it explains all windows far
+/// better than that nothing is wrong, and than that another sensor is. Gravity is that of the last
+/// standstill, turned by the gyro; so nothing is said before the first standstill, nor later
+/// than half a minute after one. Independent of everything that is estimated elsewhere. Cost: three
+/// rotations per sample, 200 accounts per half second.
+class MotionAgreement {
+ public:
+  /// Mounting of the IMU and geometry of the car.
+  explicit MotionAgreement(const LidarImuInputParameters& parameters);
+
+  /// A sample in frame sensor, its force in m/s^2; stamps advance.
+  void add(const model::ImuSample& raw);
+  /// A sample of the wheels as it came.
+  void add(const model::WheelSample& raw);
+
+  /// What is wrong, by all windows so far.
+  OddOne odd() const { return verdict_.odd; }
+  /// By how much: see MotionAccount.
+  double value() const { return verdict_.value; }
+  /// True for what is wrong with the IMU, false for the wheels.
+  static bool is_of_imu(OddOne odd) {
+    return odd == OddOne::kImuYaw || odd == OddOne::kGyroSign || odd == OddOne::kGyroUnit;
+  }
+  /// Whether motion is estimated better without the sensor that is wrong. A yaw of the IMU of some
+  /// degrees and the steering beside a gyro do little harm.
+  bool is_useless() const;
+  /// For a person, with the setting that mends it; empty where nothing is wrong.
+  std::string text() const;
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.chi2_, self.verdict_.odd, self.verdict_.value, self.rest_force_, self.rest_rate_,
+      self.rest_windows_, self.rested_utime_, self.turned_, self.window_, self.speed_before_,
+      self.turn_before_, self.latest_imu_, self.latest_wheels_utime_);
+  }
+
+ private:
+  static constexpr std::size_t kGyros = 3;  ///< As it is, turned round, in degrees.
+
+  /// Sums over half a second.
+  struct Window {
+    model::Utime from = 0;
+    double seconds = 0.0;
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< Times seconds, frame sensor.
+    Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+    std::array<Eigen::Vector3d, kGyros> free_force{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                                                   Eigen::Vector3d::Zero()};
+    std::array<double, kGyros> turn{};
+    double speed = 0.0;  ///< Sums over samples of the wheels.
+    double steered = 0.0;
+    double fastest = 0.0;
+    double samples = 0.0;
+    double last_speed = 0.0;  ///< Of the last tenth of a second.
+    double last_samples = 0.0;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& self) {
+      a(self.from, self.seconds, self.force, self.rate, self.free_force, self.turn, self.speed,
+        self.steered, self.fastest, self.samples, self.last_speed, self.last_samples);
+    }
+  };
+  /// What a window measured.
+  struct Measured {
+    std::array<Eigen::Vector2d, kGyros> force_mps2;  ///< Without gravity, frame vehicle.
+    std::array<double, kGyros> turn_rad_s{};
+    std::array<double, kGyros> turning_rad_s2{};  ///< Change of the rate.
+    double speed_mps = 0.0;
+    double acceleration_mps2 = 0.0;
+    double steered_rad_s = 0.0;  ///< By speed and steering.
+  };
+
+  void end_window(model::Utime utime);
+  void rest();
+  void compare(const Measured& measured);
+  double misfit(const MotionAccount& account, const Measured& measured) const;
+  void judge();
+  /// The best account of each sensor, and that nothing is wrong: places in accounts_.
+  struct Best {
+    std::size_t none = 0;
+    std::size_t imu = 0;
+    std::size_t wheels = 0;
+  };
+  Best best(bool steered) const;
+  Measured measured() const;
+
+  SensorMount mount_;
+  CarGeometry car_;
+  double rest_speed_mps_;
+  std::vector<MotionAccount> accounts_;  ///< Their chi2 is in chi2_.
+  std::vector<double> chi2_;
+  MotionAccount verdict_;
+
+  Eigen::Vector3d rest_force_ = Eigen::Vector3d::Zero();  ///< At the last standstill.
+  Eigen::Vector3d rest_rate_ = Eigen::Vector3d::Zero();
+  double rest_windows_ = 0.0;  ///< Of this standstill; 0 = moving.
+  std::optional<model::Utime> rested_utime_;
+  std::array<Eigen::Quaterniond, kGyros> turned_;  ///< Since then, by each gyro.
+  Window window_;
+  std::optional<double> speed_before_;  ///< At the end of the window before.
+  std::array<double, kGyros> turn_before_{};
+  std::optional<model::ImuSample> latest_imu_;
+  model::Utime latest_wheels_utime_ = 0;
+};
+
+}  // namespace understory::lidar_imu_input
