@@ -20,7 +20,7 @@ constexpr model::Utime kLeastPause_us = 500'000;
 /// Keyframes of fewer scans wait at the start until so many scans show the noise.
 constexpr std::uint64_t kWaitingScans = 4;
 
-constexpr state::Format kFormat{"keyframer.joint", 11};
+constexpr state::Format kFormat{"keyframer.joint", 12};
 
 std::vector<std::uint64_t> numbers_of(const PlacedScan& placed) {
   return {placed.tracks.begin(), placed.tracks.end()};
