@@ -22,6 +22,8 @@ void add_loop_command(CLI::App& parent);
 void add_map_command(CLI::App& parent);
 /// `understory replay`: a log through chosen services.
 void add_replay_command(CLI::App& parent);
+/// `understory report`: a drive as one HTML file.
+void add_report_command(CLI::App& parent);
 /// `understory sim`: a simulated drive.
 void add_sim_command(CLI::App& parent);
 /// `understory status`: HEALTH of all processes.

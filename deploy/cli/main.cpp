@@ -23,6 +23,7 @@ int run(int argc, char** argv) {
   understory::cli::add_doctor_command(app);
   understory::cli::add_import_command(app);
   understory::cli::add_export_command(app);
+  understory::cli::add_report_command(app);
   understory::cli::add_log_command(app);
   understory::cli::add_why_command(app);
   understory::cli::add_map_command(app);

@@ -120,6 +120,10 @@ class Drive:
         ]
         return np.array(rows, dtype=[*_POSE, *_COVARIANCE, ("keyframe_seq", int)])
 
+    def health_messages(self):
+        """HEALTH as it came: messages with all reasons and channels."""
+        return list(self._messages["HEALTH"])
+
     def health(self):
         """HEALTH: process, state (see HEALTH_STATE), the last reason, median and 99th percentile of
         latency [s], resident memory [bytes]. Times are of the sender's clock."""

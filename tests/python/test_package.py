@@ -263,6 +263,32 @@ class Results(unittest.TestCase):
         with self.assertRaisesRegex(maps.MapError, "run.lcm"):
             maps.landmarks(self.files / "run.lcm")
 
+    def test_the_report_is_one_file(self):
+        made = subprocess.run([BUILD / "bin/understory", "report", self.files / "run.lcm"], capture_output=True, text=True, check=True)
+        text = (self.files / "run.html").read_text()
+        self.assertEqual(made.stdout.strip(), str(self.files / "run.html"))
+        for part in ("poses TRACKED", "ATE", "a replay writes none", "data:image/png;base64,", "SLAM_POSE"):
+            self.assertIn(part, text)
+        self.assertNotIn("<script", text)
+        self.assertNotIn("http", text)
+        refused = subprocess.run([BUILD / "bin/understory", "report", self.files / "drive.lcm"], capture_output=True, text=True)
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("no SLAM_POSE", refused.stderr)
+
+    def test_the_report_tells_of_health(self):
+        with log.LogWriter(self.files / "live.lcm") as writer:
+            for event in log.read(self.files / "run.lcm", ["SLAM_POSE", "MAP"]):
+                writer.write(event.utime, event.channel, event.data)
+            for second, (state, why) in enumerate([(1, ""), (1, ""), (2, "sweeps <late>"), (1, "sweeps <late>")]):
+                health = understory.health_t()
+                health.utime, health.process, health.state, health.last_error = 1_000_000 * second, "mapper", state, why
+                health.latency_p50_us, health.latency_p99_us, health.rss_bytes = 2000, 30_000, 50_000_000
+                writer.write(health.utime, "HEALTH", health)
+        subprocess.run([BUILD / "bin/understory", "report", self.files / "live.lcm"], capture_output=True, check=True)
+        text = (self.files / "live.html").read_text()
+        self.assertIn("<td class=\"text\">DEGRADED</td><td class=\"text\">sweeps &lt;late&gt;</td>", text)
+        self.assertEqual(text.count(">mapper<"), 3)  # Degraded, mended, and its times.
+
     def test_the_plot_is_a_picture(self):
         environment = {"PYTHONPATH": str(BUILD / "python"), "PATH": "/usr/bin:/bin", "HOME": self.folder.name}
         subprocess.run([sys.executable, "-m", "understory.plot", self.files / "run.lcm", self.files / "a.png"], env=environment, check=True)

@@ -1,0 +1,80 @@
+// `understory report`: a drive as one HTML file, drawn by the Python package.
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/paths.hpp"
+
+namespace understory::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Debian's interpreter: it has numpy and matplotlib.
+constexpr const char* kPython = "/usr/bin/python3";
+
+struct ReportOptions {
+  std::string log;
+  std::string out;
+};
+
+/// Where the package `understory` lies: beside a build or an installation.
+std::optional<fs::path> python_folder() {
+  const fs::path above = executable_directory().parent_path();
+  for (const char* const folder : {"python", "lib/python3/dist-packages"}) {
+    if (fs::exists(above / folder / "understory" / "report.py")) return above / folder;
+  }
+  return std::nullopt;
+}
+
+/// Runs it and waits; its exit status, -1 where it could not be started or was ended by a signal.
+int run_and_wait(std::vector<std::string> words) {
+  std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+
+  pid_t child = 0;
+  int status = 0;
+  if (posix_spawn(&child, argv[0], nullptr, nullptr, argv.data(), environ) != 0) return -1;
+  if (waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
+  return WEXITSTATUS(status);
+}
+
+void run_report(ReportOptions options) {
+  const auto folder = python_folder();
+  if (!folder) fail("report: the Python package of understory is not beside this program");
+  if (!fs::exists(kPython))
+    fail(fmt::format("report: no {} (apt-get install python3-matplotlib)", kPython));
+  if (options.out.empty()) options.out = fs::path(options.log).replace_extension(".html").string();
+
+  constexpr const char* kProgram =
+      "import sys; sys.path.insert(0, sys.argv.pop(1)); from understory.report import main; main()";
+  const int status =
+      run_and_wait({kPython, "-c", kProgram, folder->string(), options.log, options.out});
+  if (status != 0) fail(fmt::format("report: {} was not made", options.out));
+  fmt::print("{}\n", options.out);
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& parent) {
+  auto* command = parent.add_subcommand(
+      "report", "A drive as one HTML file: map, errors, health, times, channels");
+  const auto options = std::make_shared<ReportOptions>();
+  command->add_option("log", options->log, "An LCM log with the mapper's output")->required();
+  command->add_option("--out", options->out, "The file (default: the log's name with .html)");
+  command->callback([options] { run_report(*options); });
+}
+
+}  // namespace understory::cli
