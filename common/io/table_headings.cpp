@@ -36,6 +36,12 @@ constexpr std::array kKnownHeadings{KnownHeading{"x", kX},
                                     KnownHeading{"diameter", kDiameter},
                                     KnownHeading{"kind", LandmarkColumn::kKind}};
 
+/// What --columns calls them.
+constexpr std::array<std::string_view, kLandmarkColumns> kRoleNames{"x", "y", "sigma", "dbh",
+                                                                    "kind"};
+/// Letters by which a heading may differ from a known one to be meant for it.
+constexpr std::size_t kNear = 3;
+
 /// Headings of degrees.
 constexpr std::array<std::string_view, 6> kDegrees{"lat", "latitude", "lon",
                                                    "lng", "long",     "longitude"};
@@ -130,16 +136,18 @@ std::string missing_text(LandmarkColumn column, const std::vector<std::string>& 
 
   std::string text =
       fmt::format("no column for {}: headings that are known are {}", role, fmt::join(known, ", "));
-  if (!nearest.empty())
-    text +=
-        fmt::format("; nearest is '{}' (--columns {}={})", nearest.substr(0, 40), role, nearest);
+  if (least <= kNear)
+    text += fmt::format("; nearest is '{}' (--columns '{}={}')", nearest.substr(0, 40), role,
+                        nearest.substr(0, 40));
   return text;
 }
 
 void take(TableHeadings& result, LandmarkColumn column, const FoundColumn& found,
           std::string_view heading) {
   auto& place = result.columns[static_cast<std::size_t>(column)];
-  if (place) throw std::invalid_argument(fmt::format("column {} comes twice", heading));
+  if (place)
+    throw std::invalid_argument(fmt::format("column {} comes twice: '{}' is another one of it",
+                                            kRoleNames[static_cast<std::size_t>(column)], heading));
   place = found;
 }
 
@@ -151,8 +159,17 @@ void take_named(TableHeadings& result, std::span<const std::string_view> heading
                                             fmt::join(headings, ", ")));
   const PlainHeading role = plain(one.role);
   const LandmarkColumn column = *column_of(role.name);
-  take(result, column,
-       {static_cast<std::size_t>(at - headings.begin()), unit_m(role, one.role, column)}, one.role);
+  const std::string unit = plain(one.heading).unit;
+  if (!role.unit.empty() && !unit.empty() && unit != role.unit)
+    throw std::invalid_argument(
+        fmt::format("--columns {}={}: the heading says {}", one.role, one.heading, unit));
+  const auto place = static_cast<std::size_t>(at - headings.begin());
+  const auto is_taken = [&](const auto& found) { return found && found->place == place; };
+  if (std::ranges::any_of(result.columns, is_taken))
+    throw std::invalid_argument(fmt::format("--columns: '{}' is named twice", one.heading));
+
+  const PlainHeading with_unit{role.name, role.unit.empty() ? unit : role.unit};
+  take(result, column, {place, unit_m(with_unit, one.heading, column)}, one.role);
 }
 
 }  // namespace

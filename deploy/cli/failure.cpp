@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <system_error>
 
 #include "common/terminal/printable.hpp"
 
@@ -17,6 +18,12 @@ void fail(const std::string& what) {
 void wrong_usage(const std::string& what) {
   fmt::print(stderr, "understory: {}\n", terminal::printable_lines(what));
   throw CLI::RuntimeError(2);
+}
+
+void refuse_to_overwrite(const std::filesystem::path& in, const std::filesystem::path& out) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(in, out, ignored))
+    wrong_usage(fmt::format("--out: {} is the input itself", out.string()));
 }
 
 }  // namespace understory::cli

@@ -131,6 +131,7 @@ void import_chosen(const BagImportOptions& options, bag::Bag& bag, const bag::Su
 void import_bag(BagImportOptions options) {
   if (options.is_list == !options.out.empty())
     wrong_usage("import bag: either --list or --out RUN.lcm");
+  refuse_to_overwrite(options.path, options.out);
   static const std::map<std::string, double> kUnits{
       {"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
   if (!options.point_time.empty())

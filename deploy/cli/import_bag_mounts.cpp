@@ -138,6 +138,12 @@ std::string bag_settings(const bag::Bag& bag, const bag::Survey& survey, const B
 
 void write_bag_config(const std::string& folder, const std::string& settings) {
   const std::filesystem::path path(folder);
+  for (const char* const name : {"launch.toml", "lidar_imu_input.toml"}) {
+    if (std::filesystem::exists(path / name))
+      throw io::DataError(
+          fmt::format("--config: {} is there already and may have been edited: name another folder",
+                      (path / name).string()));
+  }
   std::filesystem::create_directories(path);
   const auto base = std::filesystem::absolute(default_config_directory()) / "lidar";
   write_text_file(path / "launch.toml",

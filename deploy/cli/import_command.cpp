@@ -12,6 +12,7 @@
 #include "common/terminal/progress.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
 #include "deploy/cli/guarded_import.hpp"
 #include "deploy/cli/import_bag.hpp"
 #include "deploy/cli/import_sensors.hpp"
@@ -90,6 +91,7 @@ class Importer {
 };
 
 void import_victoria_park(const VictoriaParkImportOptions& options) {
+  refuse_to_overwrite(options.path, options.out);
   guarded_import([&] {
     const io::VictoriaPark recording = io::read_victoria_park(options.path);
     io::LcmLogWriter writer(options.out);

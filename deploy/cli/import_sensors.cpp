@@ -219,7 +219,10 @@ CLI::App* add_format(CLI::App& import, const std::string& name, const std::strin
   CLI::App* command = import.add_subcommand(name, what);
   if (!path.empty()) command->add_option("path", options->path, path)->required();
   command->add_option("--out", options->out, "The log to write")->required();
-  command->callback([options, run] { guarded_import([&] { run(*options); }); });
+  command->callback([options, run] {
+    refuse_to_overwrite(options->path, options->out);
+    guarded_import([&] { run(*options); });
+  });
   return command;
 }
 

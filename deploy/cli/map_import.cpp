@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "common/io/landmark_table.hpp"
 #include "common/io/text_file.hpp"
@@ -27,12 +28,15 @@ struct MapImportOptions {
   std::string out;
   std::string name;
   std::string columns;
-  std::uint32_t map_id = 0;  ///< 0 = the next free one.
+  std::vector<double> origin_m{0.0, 0.0};  ///< Of the map, in the table's frame.
+  std::uint32_t map_id = 0;                ///< 0 = the next free one.
   double sigma_m = 0.1;
   double near_m = 0.1;
   bool replace = false;
 };
 
+/// A vehicle is located by landmarks within this of a map's origin [m].
+constexpr double kLocatable_m = 2.0e6;
 /// Pairs that are listed one by one.
 constexpr std::size_t kMostPairs = 10;
 
@@ -76,10 +80,20 @@ StoredMap map_of_table(const MapImportOptions& options) {
   StoredMap map;
   map.map_id = options.map_id;
   map.landmarks.reserve(rows.size());
+  const Eigen::Vector2d origin_m(options.origin_m[0], options.origin_m[1]);
+  double farthest_m = 0.0;
   for (const io::LandmarkRow& row : rows) {
     map.landmarks.push_back({row.landmark, std::nullopt, std::nullopt});
+    Eigen::Vector2d& position_m = map.landmarks.back().landmark.position_m;
+    position_m -= origin_m;
+    farthest_m = std::max(farthest_m, position_m.cwiseAbs().maxCoeff());
     map.landmarks.back().landmark.id = map_file::landmark_id(options.map_id, map.landmarks.size());
   }
+  if (farthest_m > kLocatable_m)
+    fmt::print(stderr,
+               "{}: coordinates reach {:.0f} m: the map can be kept and exported, but nothing is "
+               "located farther than 2,000 km from its origin (--origin X,Y moves it there)\n",
+               options.source, farthest_m);
   return map;
 }
 
@@ -205,6 +219,11 @@ void add_map_import(CLI::App& map) {
                    "'BHD [cm]' and the like), or an LCM log with the mapper's output")
       ->required();
   command->add_option("--out", options->out, "The map file; made, or added to")->required();
+  command
+      ->add_option("--origin", options->origin_m,
+                   "[m] Where the map's origin lies in the table's frame: X,Y. It is subtracted")
+      ->delimiter(',')
+      ->expected(2);
   command->add_option("--columns", options->columns,
                       "Which column is what, where the headings do not say it: "
                       "x=HEADING,y=HEADING,dbh_cm=HEADING,sigma_m=HEADING,kind=HEADING");

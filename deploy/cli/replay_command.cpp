@@ -109,6 +109,9 @@ void lay_map_over(const ReplayOptions& options, bus::ReplayOptions& replay) {
 
 void run(const ReplayOptions& options) {
   terminal::catch_interrupts();
+  refuse_to_overwrite(options.log, options.out);
+  if (!std::filesystem::is_directory(options.config))
+    wrong_usage(fmt::format("--config: {}: no such folder", options.config.string()));
   bus::ReplayOptions replay_options;
   replay_options.log = options.log;
   replay_options.out = options.out;

@@ -58,8 +58,10 @@ void run_report(ReportOptions options) {
     fail(fmt::format("report: no {} (apt-get install python3-matplotlib)", kPython));
   if (options.out.empty()) options.out = fs::path(options.log).replace_extension(".html").string();
 
+  if (fs::is_directory(options.out)) wrong_usage("--out: " + options.out + " is a folder");
   constexpr const char* kProgram =
       "import sys; sys.path.insert(0, sys.argv.pop(1)); from understory.report import main; main()";
+  refuse_to_overwrite(options.log, options.out);
   const int status =
       run_and_wait({kPython, "-c", kProgram, folder->string(), options.log, options.out});
   if (status != 0) fail(fmt::format("report: {} was not made", options.out));

@@ -39,7 +39,13 @@ def _groups(url):
     parts = urlparse(url)
     if parts.scheme != "udpm" or not parts.hostname or not parts.port:
         raise ValueError(f"{url}: not of the form udpm://ADDRESS:PORT?ttl=N")
-    ttl = int(parse_qs(parts.query).get("ttl", ["0"])[0])
+    try:
+        ttl = int(parse_qs(parts.query).get("ttl", ["0"])[0])
+        first = socket.inet_aton(parts.hostname)[0]
+    except (ValueError, OSError):
+        raise ValueError(f"{url}: neither an address of four numbers nor a TTL") from None
+    if not 224 <= first <= 239 or not 0 <= ttl <= 255:
+        raise ValueError(f"{url}: no multicast group (224.0.0.0 to 239.255.255.255), or no TTL of 0 to 255")
     front, last = parts.hostname.rsplit(".", 1)
     beside = int(last) + 1 if int(last) < 255 else int(last) - 1
     bulk_port = parts.port + 1 if parts.port < 65535 else parts.port - 1

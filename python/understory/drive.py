@@ -164,6 +164,8 @@ def errors_m(poses, truth, hold_first=False):
     (Umeyama 1991 without scale: the ATE is the RMS of this), or by the first pose alone: what a pose
     states of itself counts from there.
     """
+    if len(truth) == 0:
+        return np.full(len(poses), np.nan)
     inside = (poses["t_s"] >= truth["t_s"][0]) & (poses["t_s"] <= truth["t_s"][-1])
     result = np.full(len(poses), np.nan)
     if np.count_nonzero(inside) < 2:

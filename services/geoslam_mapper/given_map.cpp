@@ -138,6 +138,10 @@ std::string why_not_given(const model::WholeMap& map) {
       return "ids of landmarks must ascend and have the number of a map";
     if (!is_sound(landmark))
       return "landmark " + std::to_string(landmark.id) + " has a value that cannot be";
+    if (!constellation::PointGrid::representable(landmark.position_m))
+      return "landmark " + std::to_string(landmark.id) +
+             " is more than 2,000 km from the map's origin, and nothing is located there: "
+             "`understory map import --origin X,Y` moves it";
     last = landmark.id;
   }
   return {};

@@ -39,7 +39,7 @@ TEST_CASE("what is no table of landmarks is refused with its line", "[io]") {
            {"\n\n", "stems.csv: ", "no heading"},
            {"x_m,y_m\n", "stems.csv: ", "no landmark"},
            {"1,2\n3,4\n", "line 1", "no column for x"},
-           {"x_m,northig\n1,2\n", "line 1", "nearest is 'northig' (--columns y=northig)"},
+           {"x_m,northig\n1,2\n", "line 1", "nearest is 'northig' (--columns 'y=northig')"},
            {"x,y,dbh\n1,2,30\n", "line 1", "column 'dbh' has no unit"},
            {"x,y,dbh [inch]\n1,2,3\n", "line 1", "the unit 'inch' is none of m, cm, mm"},
            {"lon,lat\n8.1,50.2\n", "line 1", "column 'lon' is in degrees"},
@@ -115,6 +115,14 @@ TEST_CASE("a person says which column is what", "[io]") {
   for (const char* wrong : {"x", "x=", "=a", "height_m=h", "x=a,,y=b"})
     CHECK_THROWS_AS(io::parse_named_columns(wrong), std::invalid_argument);
   CHECK(io::parse_named_columns("").empty());
+  for (const auto& [columns, what] : std::vector<std::pair<std::string, std::string>>{
+           {"dbh_cm=D [mm]", "the heading says mm"}, {"x=x,y=x", "'x' is named twice"}})
+    CHECK_THROWS_WITH(io::parse_landmark_table("x,y,D [mm]\n1,2,3\n", "s.csv",
+                                               {0.2, io::parse_named_columns(columns)}),
+                      Contains(what));
+  const auto by_heading = io::parse_landmark_table("x,y,D [mm]\n1,2,300\n", "s.csv",
+                                                   {0.2, io::parse_named_columns("dbh=D [mm]")});
+  CHECK(by_heading.rows.front().landmark.radius_m == Approx(0.15));
   const auto unitless = io::parse_named_columns("dbh=D");
   CHECK_THROWS_WITH(io::parse_landmark_table("x,y,D\n1,2,3\n", "s.csv", {0.2, unitless}),
                     Contains("has no unit"));

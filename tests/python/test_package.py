@@ -174,8 +174,9 @@ class LiveBus(unittest.TestCase):
         sender.close(), receiver.close()
 
     def test_another_url_is_refused(self):
-        for url in ("tcpq://localhost:7700", "udpm://239.255.76.67", "nonsense"):
-            with self.assertRaisesRegex(ValueError, "udpm://ADDRESS"):
+        for url in ("tcpq://localhost:7700", "udpm://239.255.76.67", "nonsense", "udpm://localhost:7667", "udpm://10.0.0.1:7667",
+                    "udpm://[::1]:7667", "udpm://239.255.76.67:7667?ttl=x", "udpm://239.255.76.67:7667?ttl=300"):
+            with self.assertRaisesRegex(ValueError, re.escape(url)):
                 bus.Bus(url)
 
     def test_a_stage_in_python_takes_its_place(self):
@@ -248,6 +249,7 @@ class Results(unittest.TestCase):
         errors = drive.errors_m(poses, truth, hold_first=True)
         sigma_m = np.sqrt(np.trace(poses["covariance"][:, :2, :2], axis1=1, axis2=2))
         self.assertLess(errors[0], 1e-9)
+        self.assertTrue(np.isnan(drive.errors_m(poses, truth[:0])).all())
         self.assertGreater(np.mean(errors < 3 * sigma_m + 0.02), 0.8)
 
     def test_the_map_is_that_of_the_file(self):
@@ -262,6 +264,31 @@ class Results(unittest.TestCase):
     def test_what_is_no_map_is_named(self):
         with self.assertRaisesRegex(maps.MapError, "run.lcm"):
             maps.landmarks(self.files / "run.lcm")
+
+    def test_no_input_is_overwritten(self):
+        command, run = str(BUILD / "bin/understory"), self.files / "run.lcm"
+        before = run.read_bytes()
+        link = self.files / "link.lcm"
+        link.symlink_to(run)
+        for words in (["report", run, "--out", run], ["report", link, "--out", run], ["replay", run, "--out", link],
+                      ["import", "bag", run, "--out", run], ["import", "pcap", link, "--out", run]):
+            with self.subTest(words[0]):
+                refused = subprocess.run([command, *words], capture_output=True, text=True)
+                self.assertEqual(refused.returncode, 2)
+                self.assertIn("is the input itself", refused.stderr)
+        self.assertEqual(run.read_bytes(), before)
+
+    def test_a_survey_in_world_coordinates_is_moved_to_an_origin(self):
+        table = self.files / "utm.csv"
+        table.write_text("Easting;Northing\n401234,567;5654321,001\n401239,102;5654318,470\n")
+        command = str(BUILD / "bin/understory")
+        far = subprocess.run([command, "map", "import", table, "--out", self.files / "far.gpkg"], capture_output=True, text=True, check=True)
+        self.assertIn("nothing is located farther than 2,000 km", far.stderr)
+        np.testing.assert_array_equal(maps.landmarks(self.files / "far.gpkg")["y_m"], [5654321.001, 5654318.470])
+        near = subprocess.run([command, "map", "import", table, "--origin", "401000,5654000", "--out", self.files / "near.gpkg"],
+                              capture_output=True, text=True, check=True)
+        self.assertEqual(near.stderr, "")
+        np.testing.assert_allclose(maps.landmarks(self.files / "near.gpkg")["x_m"], [234.567, 239.102], atol=1e-6)
 
     def test_the_report_is_one_file(self):
         made = subprocess.run([BUILD / "bin/understory", "report", self.files / "run.lcm"], capture_output=True, text=True, check=True)
