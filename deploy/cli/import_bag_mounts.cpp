@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "common/io/data_error.hpp"
 #include "common/io/number_reader.hpp"
+#include "common/io/text_file.hpp"
 #include "deploy/cli/paths.hpp"
 #include "deploy/cli/text_file.hpp"
 
@@ -138,17 +141,19 @@ std::string bag_settings(const bag::Bag& bag, const bag::Survey& survey, const B
 
 void write_bag_config(const std::string& folder, const std::string& settings) {
   const std::filesystem::path path(folder);
-  for (const char* const name : {"launch.toml", "lidar_imu_input.toml"}) {
-    if (std::filesystem::exists(path / name))
-      throw io::DataError(
-          fmt::format("--config: {} is there already and may have been edited: name another folder",
-                      (path / name).string()));
+  const auto base = std::filesystem::absolute(default_config_directory()) / "lidar";
+  const std::array<std::pair<std::filesystem::path, std::string>, 2> files{
+      {{path / "launch.toml", fmt::format("base = \"{}\"\n", base.lexically_normal().string())},
+       {path / "lidar_imu_input.toml", settings}}};
+
+  // What a person edited stays.
+  for (const auto& [file, text] : files) {
+    if (std::filesystem::exists(file) && io::read_whole_file(file.string()) != text)
+      throw io::DataError(fmt::format(
+          "--config: {} is there already and reads otherwise: name another folder", file.string()));
   }
   std::filesystem::create_directories(path);
-  const auto base = std::filesystem::absolute(default_config_directory()) / "lidar";
-  write_text_file(path / "launch.toml",
-                  fmt::format("base = \"{}\"\n", base.lexically_normal().string()));
-  write_text_file(path / "lidar_imu_input.toml", settings);
+  for (const auto& [file, text] : files) write_text_file(file, text);
 }
 
 }  // namespace understory::cli

@@ -1,6 +1,7 @@
 // Bags through the command: the same log from every container, and a line for everything that a
 // person must decide.
 #include <cmath>
+#include <fstream>
 #include <map>
 
 #include "common/wire/convert.hpp"
@@ -230,6 +231,18 @@ TEST_CASE("import bag: every container gives what the sensors gave, byte for byt
                             " --out " + folder.path("replayed.lcm"));
   CAPTURE(replay.error);
   REQUIRE(replay.status == 0);
+
+  // What a person edited in it stays.
+  const std::string edited = settings + "# by hand\n";
+  std::ofstream(folder.path("config") + "/lidar_imu_input.toml") << edited;
+  const std::string bag =
+      folder.write(all_bag_forms().front(), drive.bag.at(all_bag_forms().front().encoding()));
+  const Outcome again =
+      folder.import(bag, "--odometry /odom --max-range 100 --out " + folder.path("again.lcm") +
+                             " --config " + folder.path("config"));
+  CHECK(again.status == 1);
+  CHECK_THAT(again.error, Contains("lidar_imu_input.toml is there already and reads otherwise"));
+  CHECK(read_text(folder.path("config") + "/lidar_imu_input.toml") == edited);
   CHECK(channels_of(folder.path("replayed.lcm"))["LIDAR_SWEEP"].size() > 30);
 }
 
