@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <limits>
 
 #include "common/bag/joined_bag.hpp"
@@ -13,6 +12,7 @@
 #include "common/bag/sqlite_bag.hpp"
 #include "common/bag/unpack.hpp"
 #include "common/io/data_error.hpp"
+#include "common/io/file_window.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/mcap/encoder.hpp"
 
@@ -22,11 +22,9 @@ namespace {
 constexpr std::string_view kSqliteMagic{"SQLite format 3\0", 16};
 
 std::string first_bytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes(kSqliteMagic.size(), '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
-  return bytes;
+  io::FileWindow file(path);
+  const auto bytes = file.peek(0, kSqliteMagic.size());
+  return {bytes.begin(), bytes.end()};
 }
 
 [[noreturn]] void refuse_file(const std::filesystem::path& path, const std::string& begin) {
@@ -45,7 +43,6 @@ std::unique_ptr<Bag> open_file(const std::filesystem::path& path) {
     if (begin.starts_with(kRos1Magic)) return std::make_unique<Ros1Bag>(path);
     if (begin.starts_with(mcap::kMagic)) return std::make_unique<McapFile>(path);
     if (begin.starts_with(kSqliteMagic)) return std::make_unique<SqliteBag>(path);
-    const io::FileWindow can_be_opened(path);
     refuse_file(path, begin);
   } catch (const io::LogError& error) {
     throw io::DataError(error.what());

@@ -24,7 +24,7 @@ struct Topic {
   std::string type;                            ///< For example sensor_msgs/PointCloud2.
   Encoding encoding = Encoding::kOther;        ///< Of its messages.
   std::string encoding_name;                   ///< As the file calls it.
-  std::optional<std::uint64_t> messages = {};  ///< Where the file tells it.
+  std::optional<std::uint64_t> messages = {};  ///< As the file states it; none where it does not.
 
   /// Whether it is the same stream.
   bool is_same(const Topic& other) const {

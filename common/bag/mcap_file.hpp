@@ -6,7 +6,7 @@
 namespace understory::bag {
 
 /// A file, finished or not. It is walked from front to back, record by record; chunks are passed
-/// over where their message indexes tell what is in them.
+/// over where their message indexes list what is in them.
 class McapFile : public ChunkedBag {
  public:
   /// Throws io::DataError.

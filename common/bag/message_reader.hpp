@@ -15,7 +15,7 @@
 namespace understory::bag {
 
 /// Reads a message field by field, in the order of its definition; every length is checked against
-/// the bytes that are left. Throws io::DataError telling what ends where.
+/// the bytes that are left. Throws io::DataError that names what ends, and at which byte.
 class MessageReader {
  public:
   /// CDR begins with its own header of four bytes: plain CDR and XCDR2 of final types are read. A

@@ -46,7 +46,7 @@ std::vector<NamedColumn> parse_named_columns(std::string_view text);
 /// Recognises headings, whatever their case, blanks and underscores: x, east, easting, rechtswert;
 /// y, north, northing, hochwert; dbh, bhd, diameter; sigma; kind. A unit stands behind: x_m, "BHD
 /// [cm]", dbh_mm. Coordinates without one are in metres; a diameter or sigma without one is
-/// refused, since nothing tells. `named` columns count instead of what is recognised. Throws
+/// refused, since its unit is unknown. `named` columns count instead of what is recognised. Throws
 /// std::invalid_argument (a text for the heading's line) where x or y is missing, with the heading
 /// that is nearest; for a column that comes twice, a named one that is not there, an unknown unit,
 /// and for degrees. Cost O(headings times known ones).

@@ -13,7 +13,7 @@
 namespace understory::cli {
 namespace {
 
-/// Below it a steering angle cannot be told from noise [m/s].
+/// Below it a steering angle is noise [m/s].
 constexpr double kSlow_mps = 0.1;
 constexpr double kMoved_m = 1.0;
 

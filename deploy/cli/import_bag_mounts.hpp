@@ -21,7 +21,7 @@ class BagMounts {
   BagMounts(bag::StaticTransforms transforms, const std::string& base,
             const std::vector<std::string>& stated);
 
-  /// vehicle_T_frame; none = neither the bag nor an option tells it.
+  /// vehicle_T_frame; none = stated by neither the bag nor an option.
   std::optional<Eigen::Isometry3d> find(const std::string& frame) const;
   const std::string& base() const { return base_; }  ///< The frame `vehicle` in the bag.
   /// Why the frame's mount is not known, with the option that states it.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/constellation/grid.hpp"
 #include "common/io/landmark_table.hpp"
 #include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
@@ -35,8 +36,6 @@ struct MapImportOptions {
   bool replace = false;
 };
 
-/// A vehicle is located by landmarks within this of a map's origin [m].
-constexpr double kLocatable_m = 2.0e6;
 /// Pairs that are listed one by one.
 constexpr std::size_t kMostPairs = 10;
 
@@ -77,6 +76,7 @@ StoredMap map_of_table(const MapImportOptions& options) {
     fmt::print(stderr, "{}: columns that were not read: {}\n", options.source,
                fmt::join(passed_over, ", "));
   report_close_pairs(options.source, rows, options.near_m);
+
   StoredMap map;
   map.map_id = options.map_id;
   map.landmarks.reserve(rows.size());
@@ -89,7 +89,8 @@ StoredMap map_of_table(const MapImportOptions& options) {
     farthest_m = std::max(farthest_m, position_m.cwiseAbs().maxCoeff());
     map.landmarks.back().landmark.id = map_file::landmark_id(options.map_id, map.landmarks.size());
   }
-  if (farthest_m > kLocatable_m)
+
+  if (farthest_m > constellation::PointGrid::kMaxCoordinate)
     fmt::print(stderr,
                "{}: coordinates reach {:.0f} m: the map can be kept and exported, but nothing is "
                "located farther than 2,000 km from its origin (--origin X,Y moves it there)\n",

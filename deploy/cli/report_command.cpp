@@ -1,16 +1,12 @@
 // `understory report`: a drive as one HTML file, drawn by the Python package.
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
+#include "common/terminal/run_program.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/paths.hpp"
@@ -37,20 +33,6 @@ std::optional<fs::path> python_folder() {
   return std::nullopt;
 }
 
-/// Runs it and waits; its exit status, -1 where it could not be started or was ended by a signal.
-int run_and_wait(std::vector<std::string> words) {
-  std::vector<char*> argv;
-  argv.reserve(words.size() + 1);
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-
-  pid_t child = 0;
-  int status = 0;
-  if (posix_spawn(&child, argv[0], nullptr, nullptr, argv.data(), environ) != 0) return -1;
-  if (waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
-  return WEXITSTATUS(status);
-}
-
 void run_report(ReportOptions options) {
   const auto folder = python_folder();
   if (!folder) fail("report: the Python package of understory is not beside this program");
@@ -63,7 +45,7 @@ void run_report(ReportOptions options) {
       "import sys; sys.path.insert(0, sys.argv.pop(1)); from understory.report import main; main()";
   refuse_to_overwrite(options.log, options.out);
   const int status =
-      run_and_wait({kPython, "-c", kProgram, folder->string(), options.log, options.out});
+      terminal::run_program({kPython, "-c", kProgram, folder->string(), options.log, options.out});
   if (status != 0) fail(fmt::format("report: {} was not made", options.out));
   fmt::print("{}\n", options.out);
 }

@@ -1,14 +1,12 @@
 #include "eval/harness/results.hpp"
 
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "common/io/output_file.hpp"
+#include "common/terminal/run_program.hpp"
 #include "eval/tools/machine.hpp"
 
 namespace understory::eval::harness {
@@ -57,15 +55,7 @@ bool plot(const std::string& script, const std::vector<std::string>& arguments) 
 
   std::vector<std::string> words{"/usr/bin/python3", path->string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> argv;
-  argv.reserve(words.size() + 1);
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-
-  pid_t child = 0;
-  int status = -1;
-  if (posix_spawn(&child, argv[0], nullptr, nullptr, argv.data(), environ) != 0 ||
-      waitpid(child, &status, 0) != child || status != 0) {
+  if (terminal::run_program(std::move(words)) != 0) {
     fmt::print(stderr, "plots: {} failed; the results themselves are complete\n", path->string());
     return false;
   }

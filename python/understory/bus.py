@@ -22,8 +22,7 @@ _SHORT = struct.Struct(">II")  # magic, sequence
 _FRAGMENT = struct.Struct(">IIIIHH")  # magic, sequence, bytes in all, offset, fragment, fragments
 _MAGIC_SHORT = 0x4C433032
 _MAGIC_FRAGMENT = 0x4C433033
-_MOST_SHORT_BYTES = 1400
-_FRAGMENT_BYTES = 1400
+_DATAGRAM_BYTES = 1400
 _MOST_MESSAGE_BYTES = 1 << 28
 _MOST_OPEN = 64  # messages of which fragments are missing
 _BUFFER_BYTES = 4 << 20
@@ -132,15 +131,15 @@ class Bus:
         data = message if isinstance(message, (bytes, bytearray)) else message.encode()
         name = channel.encode() + b"\0"
         group = self._bulk if is_bulk(channel) else self._group
-        if len(name) + len(data) <= _MOST_SHORT_BYTES:
+        if len(name) + len(data) <= _DATAGRAM_BYTES:
             self._sender.sendto(_SHORT.pack(_MAGIC_SHORT, self._sequence) + name + bytes(data), group)
         else:
             self._send_fragments(group, name, bytes(data))
         self._sequence = (self._sequence + 1) & 0xFFFFFFFF
 
     def _send_fragments(self, group, name, data):
-        first = _FRAGMENT_BYTES - len(name)
-        starts = [0, *range(first, len(data), _FRAGMENT_BYTES)]
+        first = _DATAGRAM_BYTES - len(name)
+        starts = [0, *range(first, len(data), _DATAGRAM_BYTES)]
         if len(starts) > 0xFFFF:
             raise ValueError(f"a message of {len(data)} bytes is too large for the bus")
         ends = [*starts[1:], len(data)]

@@ -9,21 +9,19 @@ Needs Debian's python3-numpy.
 
 import numpy as np
 
+import understory
 from understory import log
 
-STATUS = {
-    0: "FIRST_MAP",
-    1: "UPDATED",
-    2: "NOT_SURE",
-    3: "ROLLED_BACK",
-    4: "REJECTED",
-    5: "TRACKED",
-    6: "COASTING",
-    7: "LOST",
-    8: "NEW_MAP",
-}
-HEALTH_STATE = {0: "STARTING", 1: "OK", 2: "DEGRADED", 3: "ERROR", 4: "STOPPING"}
-KIND = {0: "trunk", 1: "corner"}
+
+def _named(message_type, prefix=""):
+    """The constants of a type by value: their names without the prefix."""
+    names = (name for name in vars(message_type) if name.isupper() and name.startswith(prefix))
+    return {getattr(message_type, name): name.removeprefix(prefix) for name in names}
+
+
+STATUS = _named(understory.slam_pose2_t)
+HEALTH_STATE = _named(understory.health_t, "STATE_")
+KIND = _named(understory.detection_t)
 
 #: Of SLAM_POSE: the others have no pose.
 _WITH_POSE = {"FIRST_MAP", "NEW_MAP", "UPDATED", "TRACKED", "COASTING"}

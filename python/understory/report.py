@@ -107,10 +107,11 @@ def _health_rows(drive):
     start_s = None
     for message in drive.health_messages():
         start_s = message.utime * 1e-6 if start_s is None else start_s
-        now = (message.state, message.last_error if message.state in (2, 3) else "")
+        is_bad = HEALTH_STATE[message.state] in ("DEGRADED", "ERROR")
+        now = (message.state, message.last_error if is_bad else "")
         if last.get(message.process) == now:
             continue
-        if message.process in last or message.state in (2, 3):
+        if message.process in last or is_bad:
             rows.append((f"{message.utime * 1e-6 - start_s:.1f}", message.process, HEALTH_STATE[message.state], now[1]))
         last[message.process] = now
     return rows

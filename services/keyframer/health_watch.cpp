@@ -82,8 +82,7 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
             bus::Condition(parameters.misstated)},
       scale_{wire::Reason::kMiscalibrated,
              "the way by wheels is longer or shorter than by landmarks: wheel scale, or the unit "
-             "of the "
-             "laser's ranges",
+             "of the laser's ranges",
              "ODOMETRY", bus::Condition(parameters.misstated)} {}
 
 void HealthWatch::judge(const InputQuality& quality) {

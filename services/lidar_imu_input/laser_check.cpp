@@ -17,6 +17,8 @@ constexpr float kNearest_m = 1.0F;
 constexpr float kFarthest_m = 20.0F;
 constexpr std::size_t kMostPoints = 400;
 constexpr int kTrials = 60;
+/// Points of a sweep whose azimuths are compared: about a degree apart.
+constexpr std::size_t kMostTurns = 400;
 /// Distance from the plane of a point of it: grass, bumps.
 constexpr double kOnPlane_m = 0.12;
 constexpr double kShareOnPlane = 0.33;
@@ -122,7 +124,9 @@ void LaserCheck::add_raw(const model::PointSweep& raw) {
   double turned = 0.0;
   double azimuth = std::atan2(raw.points.front().y_m, raw.points.front().x_m);
   float time_s = raw.points.front().time_s;
-  for (const model::SweepPoint& point : raw.points) {
+  const std::size_t step = 1 + raw.points.size() / kMostTurns;
+  for (std::size_t i = step; i < raw.points.size(); i += step) {
+    const model::SweepPoint& point = raw.points[i];
     if (point.time_s == time_s) continue;
     const double next = std::atan2(point.y_m, point.x_m);
     turned += std::remainder(next - azimuth, 2.0 * std::numbers::pi) *
@@ -184,8 +188,7 @@ std::string LaserCheck::text() const {
     case LaserFault::kTilted:
       return fmt::format(
           "the ground is tilted on the mean over {:.0f} m: lidar.mount is {:.1f} deg off about x "
-          "and "
-          "{:.1f} deg about y",
+          "and {:.1f} deg about y",
           kApart_m * count_, mean.y() / kLaserDegree_rad, -mean.x() / kLaserDegree_rad);
     case LaserFault::kWrongHeight:
       return fmt::format(

@@ -48,8 +48,9 @@ std::size_t gyro_of(OddOne odd) {
 std::vector<MotionAccount> all_accounts() {
   std::vector<MotionAccount> accounts;
   const auto add = [&](OddOne odd, double value) {
-    for (const bool steered : {true, false}) accounts.push_back({odd, value, steered, 0.0});
+    for (const bool steered : {true, false}) accounts.push_back({odd, value, steered});
   };
+
   add(OddOne::kNone, 0.0);
   for (double yaw = kLeastYaw_rad; yaw <= std::numbers::pi; yaw += kYawStep_rad) {
     add(OddOne::kImuYaw, yaw);
@@ -57,6 +58,7 @@ std::vector<MotionAccount> all_accounts() {
   }
   add(OddOne::kGyroSign, -1.0);
   add(OddOne::kGyroUnit, kAgreementDegree_rad);
+
   add(OddOne::kWheelSpeed, -1.0);
   for (double factor = kLeastSpeedStep; factor <= kMostSpeedStep; factor *= kSpeedStep) {
     for (const double one : {factor, 1.0 / factor}) {
@@ -64,7 +66,7 @@ std::vector<MotionAccount> all_accounts() {
       add(OddOne::kWheelSpeed, -one);
     }
   }
-  accounts.push_back({OddOne::kSteering, -1.0, true, 0.0});
+  accounts.push_back({OddOne::kSteering, -1.0, true});
   return accounts;
 }
 

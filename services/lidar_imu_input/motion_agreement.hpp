@@ -29,7 +29,6 @@ struct MotionAccount {
   OddOne odd = OddOne::kNone;
   double value = 0.0;   ///< Yaw to be added [rad], or factor of the speed.
   bool steered = true;  ///< False: the steering angle says nothing, the gyro gives all turns.
-  double chi2 = 0.0;    ///< Of all windows so far; one window counts little.
 };
 
 /// Over half a second each: the accelerometer without gravity against the change of the wheels'
@@ -39,7 +38,7 @@ struct MotionAccount {
 /// better than that nothing is wrong, and than that another sensor is. Gravity is that of the last
 /// standstill, turned by the gyro; so nothing is said before the first standstill, nor later
 /// than half a minute after one. Independent of everything that is estimated elsewhere. Cost: three
-/// rotations per sample, 200 accounts per half second.
+/// rotations per sample, about 560 accounts per half second.
 class MotionAgreement {
  public:
   /// Mounting of the IMU and geometry of the car.

@@ -1,0 +1,13 @@
+// Another program, run to its end.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace understory::terminal {
+
+/// Runs a program with its arguments, on this terminal, and waits. `words` has its path first. Its
+/// exit status; -1 where it could not be started or a signal ended it.
+int run_program(std::vector<std::string> words);
+
+}  // namespace understory::terminal
