@@ -1,6 +1,7 @@
 #include "common/bag/sqlite_bag.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sqlite3.h>
 
 #include <algorithm>
@@ -96,8 +97,8 @@ class SqliteBag::Database {
   }
 
   bool has_table(const std::string& name) {
-    const Statement statement =
-        prepare("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = '" + name + "'");
+    const Statement statement = prepare(
+        fmt::format("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = '{}'", name));
     return step(statement);
   }
 
@@ -157,16 +158,17 @@ void SqliteBag::list_topics() {
 
 void SqliteBag::rewind(const std::vector<std::size_t>& wanted) {
   database_->wanted.clear();
-  std::string list;
+  std::vector<std::int64_t> ids;
   for (std::size_t i = 0; i < topics_.size(); ++i) {
     if (!wanted.empty() && std::ranges::find(wanted, i) == wanted.end()) continue;
     database_->wanted.emplace(ids_[i], i);
-    list += (list.empty() ? "" : ",") + std::to_string(ids_[i]);
+    ids.push_back(ids_[i]);
   }
 
   // Ids first: where the file has no index by time, messages themselves are not sorted.
-  database_->order = database_->prepare("SELECT id, timestamp FROM messages WHERE topic_id IN (" +
-                                        list + ") ORDER BY timestamp, id");
+  database_->order = database_->prepare(fmt::format(
+      "SELECT id, timestamp FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id",
+      fmt::join(ids, ",")));
   database_->message =
       database_->prepare("SELECT topic_id, timestamp, data FROM messages WHERE id = ?");
 }

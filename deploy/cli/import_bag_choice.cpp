@@ -154,7 +154,7 @@ std::vector<std::string> bag_uses(const std::vector<bag::Topic>& topics, const B
       if (taken && taken != i) continue;
       const std::string use =
           taken ? std::string(slot.channel) : fmt::format("--{} {}", slot.option, topics[i].name);
-      uses[i] += (uses[i].empty() ? "" : " or ") + use;
+      uses[i] = uses[i].empty() ? use : fmt::format("{} or {}", uses[i], use);
     }
   }
 
@@ -162,7 +162,7 @@ std::vector<std::string> bag_uses(const std::vector<bag::Topic>& topics, const B
     if (role_of(topics[i]) == Role::kTransforms) uses[i] = "mounts";
     if (topics[i].encoding == bag::Encoding::kOther)
       uses[i] = fmt::format("encoding '{}' is not read", topics[i].encoding_name);
-    if (uses[i].empty()) uses[i] = "-";
+    if (uses[i].empty()) uses[i].assign(1, '-');
   }
   return uses;
 }

@@ -157,7 +157,8 @@ def plot_ratios(rows, file):
     axes[0].legend()
     if lost:
         axes[0].set_title(f"left out: {len(lost)} cells with shared errors, where {sum(lost.values())} runs lost their map", fontsize=9)
-    axes[1].set_xticks(range(len(labels)), labels, fontsize=7)
+    # Many of them would lie over each other.
+    axes[1].set_xticks(range(len(labels)), labels, fontsize=7, rotation=90 if len(labels) > 12 else 0)
     figure.tight_layout()
     figure.savefig(file, dpi=110)
     plt.close(figure)

@@ -107,6 +107,16 @@ inline MessageBytes pose_message(const Serialisation& how, const bag::Pose& pose
   return MessageWriter(how).header(pose.header).pose(pose.pose).bytes();
 }
 
+/// A frame in another one, as static transforms have it.
+inline bag::Pose frame_in(const std::string& parent, const std::string& child,
+                          const Eigen::Isometry3d& parent_T_child) {
+  bag::Pose pose;
+  pose.header.frame = parent;
+  pose.child_frame = child;
+  pose.pose = parent_T_child;
+  return pose;
+}
+
 inline MessageBytes transforms_message(const Serialisation& how,
                                        const std::vector<bag::Pose>& transforms) {
   MessageWriter writer(how);

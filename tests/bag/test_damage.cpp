@@ -20,9 +20,8 @@ constexpr std::int64_t kStart = 1'600'000'000'000'000'000;
 std::vector<Recorded> drive(Random& random, bag::Encoding encoding) {
   const Serialisation how{encoding, false};
   std::vector<Recorded> list;
-  list.push_back(
-      {"/tf_static", "tf2_msgs/TFMessage", kStart,
-       transforms_message(how, {{{0, "base_link"}, "laser", Eigen::Isometry3d::Identity()}})});
+  const std::vector mounts(1, frame_in("base_link", "laser", Eigen::Isometry3d::Identity()));
+  list.push_back({"/tf_static", "tf2_msgs/TFMessage", kStart, transforms_message(how, mounts)});
   std::vector<std::uint8_t> points(40 * 18);
   for (auto& byte : points) byte = static_cast<std::uint8_t>(random() % 80);
   for (std::int64_t i = 1; i <= 40; ++i) {

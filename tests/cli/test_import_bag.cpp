@@ -104,9 +104,10 @@ class DriveRecorder {
   bag::Header header(model::Utime utime, const std::string& frame) { return {utime * 1000, frame}; }
   void add_mounts() {
     now_ns_ = kStart_ns;
-    const std::vector<bag::Pose> transforms{{{0, "base_link"}, "mast", place(1.0, 0.0, 1.0)},
-                                            {{0, "/mast"}, "laser", place(0.2, 0.0, 0.9)},
-                                            {{0, "base_link"}, "imu", place(1.0, 0.0, 0.6)}};
+    std::vector<bag::Pose> transforms;
+    transforms.push_back(frame_in("base_link", "mast", place(1.0, 0.0, 1.0)));
+    transforms.push_back(frame_in("/mast", "laser", place(0.2, 0.0, 0.9)));
+    transforms.push_back(frame_in("base_link", "imu", place(1.0, 0.0, 0.6)));
     add("/tf_static", "tf2_msgs/TFMessage",
         [&](const Serialisation& how) { return transforms_message(how, transforms); });
   }
