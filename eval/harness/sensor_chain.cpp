@@ -1,5 +1,6 @@
 #include "eval/harness/sensor_chain.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -73,6 +74,15 @@ void SensorChain::feed(std::string_view channel, std::span<const std::uint8_t> b
   if (!has_begun_) begin();
   bus_.publish(channel, bytes);
   bus_.drain();
+}
+
+bool SensorChain::takes(std::string_view channel) const {
+  const auto hears = [&](const Hosted& hosted) { return hosted.service->node().takes(channel); };
+  const auto publishes = [&](const Hosted& hosted) {
+    const std::vector<std::string> outputs = hosted.service->node().outputs();
+    return std::ranges::find(outputs, channel) != outputs.end();
+  };
+  return std::ranges::any_of(hosted_, hears) && std::ranges::none_of(hosted_, publishes);
 }
 
 void SensorChain::pause(std::string_view service, bool is_paused) {

@@ -42,6 +42,9 @@ class SensorChain {
   void feed(std::string_view channel, std::span<const std::uint8_t> bytes);
   /// The same for a message in one value.
   void feed(const RawMessage& message) { feed(message.channel, message.bytes); }
+  /// Whether a service hears this channel and none of them publishes it: what a recording is fed
+  /// by.
+  bool takes(std::string_view channel) const;
   /// The service hears nothing until this is called with false: it hangs, or is being started
   /// again from its state. Throws std::out_of_range for an unknown name.
   void pause(std::string_view service, bool is_paused);

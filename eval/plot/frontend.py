@@ -1,7 +1,7 @@
 """Plots of eval frontend: python3 frontend.py RESULTS.json TRACES.json
 
 RESULTS.NAME.png for each drive of the whole chain: the map and the trajectories over the truth
-(aligned by their first pose), and the error along the drive.
+(each aligned as a whole), and the error along the drive.
 """
 import bisect
 import json
@@ -29,21 +29,25 @@ def pose_at(truth, times, time):
     return [time, a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2]), a[3] + part * turn]
 
 
-def gauge(poses, truth, times):
-    """(angle, x, y) that takes the first estimated pose onto the truth."""
-    for pose in poses:
-        real = pose_at(truth, times, pose[0])
-        if real:
-            angle = real[3] - pose[3]
-            c, s = math.cos(angle), math.sin(angle)
-            return angle, real[1] - c * pose[1] + s * pose[2], real[2] - s * pose[1] - c * pose[2]
-    return 0.0, 0.0, 0.0
-
-
 def moved(motion, x, y):
     angle, tx, ty = motion
     c, s = math.cos(angle), math.sin(angle)
     return c * x - s * y + tx, s * x + c * y + ty
+
+
+def fit(fixes, poses):
+    """The rigid motion (angle, x, y) that takes the poses at the times of `fixes` (t, x, y) best onto them."""
+    times = [p[0] for p in poses]
+    pairs = [(f, pose_at(poses, times, f[0])) for f in fixes]
+    pairs = [(f, p) for f, p in pairs if p]
+    n = max(1, len(pairs))
+    fx, fy = sum(f[1] for f, _ in pairs) / n, sum(f[2] for f, _ in pairs) / n
+    px, py = sum(p[1] for _, p in pairs) / n, sum(p[2] for _, p in pairs) / n
+    dot = sum((p[1] - px) * (f[1] - fx) + (p[2] - py) * (f[2] - fy) for f, p in pairs)
+    cross = sum((p[1] - px) * (f[2] - fy) - (p[2] - py) * (f[1] - fx) for f, p in pairs)
+    angle = math.atan2(cross, dot)
+    c, s = math.cos(angle), math.sin(angle)
+    return angle, fx - c * px + s * py, fy - s * px - c * py
 
 
 def draw(name, trace, file):
@@ -54,9 +58,9 @@ def draw(name, trace, file):
               alpha=0.35, label="truth")
     for key, (label, colour) in KINDS.items():
         poses = trace[key]
-        if not poses:
+        if len(poses) < 2:
             continue
-        motion = gauge(poses, truth, times)
+        motion = fit(truth, poses)
         places = [moved(motion, p[1], p[2]) for p in poses]
         plan.plot([p[0] for p in places], [p[1] for p in places], "-", color=colour, linewidth=1,
                   label=label)
@@ -79,27 +83,12 @@ def draw(name, trace, file):
     plan.legend(fontsize="small")
     errors.set_yscale("log")
     errors.set_xlabel("time [s]")
-    errors.set_ylabel("position error in the gauge of the first pose [m]")
+    errors.set_ylabel("position error after alignment [m]")
     errors.grid(alpha=0.3)
     errors.legend(fontsize="small")
     figure.tight_layout()
     figure.savefig(file, dpi=100)
     plt.close(figure)
-
-
-def fit(fixes, poses):
-    """The rigid motion that takes the poses at the fixes' times best onto the fixes."""
-    times = [p[0] for p in poses]
-    pairs = [(f, pose_at(poses, times, f[0])) for f in fixes]
-    pairs = [(f, p) for f, p in pairs if p]
-    n = max(1, len(pairs))
-    fx, fy = sum(f[1] for f, _ in pairs) / n, sum(f[2] for f, _ in pairs) / n
-    px, py = sum(p[1] for _, p in pairs) / n, sum(p[2] for _, p in pairs) / n
-    dot = sum((p[1] - px) * (f[1] - fx) + (p[2] - py) * (f[2] - fy) for f, p in pairs)
-    cross = sum((p[1] - px) * (f[2] - fy) - (p[2] - py) * (f[1] - fx) for f, p in pairs)
-    angle = math.atan2(cross, dot)
-    c, s = math.cos(angle), math.sin(angle)
-    return angle, fx - c * px + s * py, fy - s * px - c * py
 
 
 def draw_fixes(name, trace, file):

@@ -1,5 +1,7 @@
 // A folder of stem frames through the command: the log, its noise, and one line for each fault.
 #include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "common/io/stem_frames.hpp"
@@ -170,6 +172,22 @@ TEST_CASE("A simulated drive of stem frames is imported and scored", "[import]")
         R"("wrong_accepted")", R"("error_m_p50")", R"("stem_residual_m_p50")",
         R"("with_diameters")", R"("ms_p50")", R"("bytes_per_frame")"})
     CHECK_THAT(json, Contains(key));
+
+  // The same log through its stages: `eval recording` takes what the configuration's stages take.
+  const std::string recording = "eval recording " + (directory / "drive.lcm").string() +
+                                " --no-plots --json " + (directory / "r.json").string() +
+                                " --config " UNDERSTORY_SOURCE_CONFIG;
+  REQUIRE(understory_command(directory, recording + "/stem_frames").status == 0);
+  std::map<std::string, nlohmann::json> rows;
+  const auto document = nlohmann::json::parse(read_text(directory / "r.json"));
+  for (const auto& row : document.at("rows")) rows[row["what"]] = row["value"];
+  CHECK(rows.at("keyframes offered").get<double>() > 100);
+  CHECK(rows.at("driven").get<double>() > 250);
+  CHECK_FALSE(rows.contains("EKF_POSE ATE"));
+  const Outcome other = understory_command(directory, recording + "/lidar");
+  CHECK(other.status == 1);
+  CHECK_THAT(other.error, Contains("no channel of it is an input of the stages of") &&
+                              Contains("GROUND_TRUTH LANDMARKS"));
 
   const Outcome again = understory_command(
       directory, "sim stem-frames " + (directory / "stems.csv").string() + " --out " + drive);

@@ -56,8 +56,8 @@ void add_slam_rows(const harness::ChainRun& run, const harness::TrajectoryError&
 void add_time_rows(const harness::ChainRun& run, FrontendRows& rows) {
   rows.at_least("real-time factor of the chain (one core)", real_time_factor(run), "x", 10.0);
   for (const auto& [service, time] : run.times) {
-    rows.state(service + ": share of the drive's time", 100.0 * time.total_s / run.simulated_s,
-               "%");
+    rows.state(service + ": share of the drive's time",
+               100.0 * time.total_s / std::max(run.simulated_s, 1e-6), "%");
     rows.state(service + ": message p99", quantile_ms(time.calls_ms, 0.99), "ms");
   }
 }
@@ -70,7 +70,9 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
   const harness::TrajectoryError reckoned = harness::trajectory_error(run.dead_reckoned, run.truth);
   const harness::TrajectoryError summed = harness::trajectory_error(run.odometry, run.truth);
 
-  rows.state("driven", ekf.driven_m, "m");
+  // A configuration without the filter has no figures of it; a filter without poses has missed.
+  const bool has_ekf = run.times.contains("ekf");
+  rows.state("driven", has_ekf ? ekf.driven_m : slam.driven_m, "m");
   if (slam.poses >= 2 || ate_target_m) add_slam_rows(run, slam, ate_target_m, rows);
   if (!run.coasting.empty()) {
     const std::vector<model::SlamPose> live = harness::live_poses(run);
@@ -83,8 +85,13 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
       harness::trajectory_error(harness::poses_of(run.keyframes), run.truth);
   if (of_map.poses >= 2) rows.state("map's keyframes at the end, ATE", of_map.ate_rms_m, "m");
 
-  rows.state("EKF_POSE ATE", ekf.ate_rms_m, "m");
-  rows.at_most("EKF_POSE drift", 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0), "%", 0.5);
+  if (has_ekf) {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    const bool has_poses = ekf.poses >= 2;
+    rows.state("EKF_POSE ATE", has_poses ? ekf.ate_rms_m : kNone, "m");
+    rows.at_most("EKF_POSE drift",
+                 has_poses ? 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0) : kNone, "%", 0.5);
+  }
   // A laser alone gives neither; no error is not none.
   if (reckoned.poses > 0) rows.state("RAW_POSE ATE", reckoned.ate_rms_m, "m");
   if (summed.poses > 0) rows.state("ODOMETRY summed, ATE", summed.ate_rms_m, "m");
@@ -92,20 +99,24 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
   rows.at_most("wrong updates", static_cast<double>(wrong_updates(run)), "", 0.0);
   rows.state("keyframes accepted", static_cast<double>(accepted(run)), "");
   rows.state("keyframes offered", static_cast<double>(run.updates.size()), "");
-  rows.state("SLAM_POSE share of sweeps",
-             100.0 * static_cast<double>(run.slam.size()) / static_cast<double>(run.sweeps), "%");
-  rows.state("SLAM_POSE COASTING, share of sweeps",
-             100.0 * static_cast<double>(run.coasting.size()) / static_cast<double>(run.sweeps),
-             "%");
+  const auto share = [&](std::size_t poses) {
+    return 100.0 * static_cast<double>(poses) /
+           static_cast<double>(std::max<std::uint64_t>(run.sweeps, 1));
+  };
+  rows.state("SLAM_POSE share of sweeps", share(run.slam.size()), "%");
+  rows.state("SLAM_POSE COASTING, share of sweeps", share(run.coasting.size()), "%");
   add_time_rows(run, rows);
 }
 
 nlohmann::json trace_of(const harness::ChainRun& run) {
-  const auto points = [](const std::vector<metrics::StampedPose>& poses, std::size_t stride) {
+  const auto points = [](const std::vector<metrics::StampedPose>& poses, model::Utime apart) {
     nlohmann::json out = nlohmann::json::array();
-    for (std::size_t i = 0; i < poses.size(); i += stride) {
-      out.push_back({1e-6 * static_cast<double>(poses[i].utime), poses[i].pose.x(),
-                     poses[i].pose.y(), poses[i].pose.theta()});
+    model::Utime next = std::numeric_limits<model::Utime>::min();
+    for (const metrics::StampedPose& pose : poses) {
+      if (pose.utime < next) continue;
+      next = pose.utime + apart;
+      out.push_back({1e-6 * static_cast<double>(pose.utime), pose.pose.x(), pose.pose.y(),
+                     pose.pose.theta()});
     }
     return out;
   };
@@ -121,10 +132,10 @@ nlohmann::json trace_of(const harness::ChainRun& run) {
     counts.push_back({1e-6 * static_cast<double>(pose.utime), pose.landmarks_used});
   }
 
-  return {{"truth", points(run.truth, 5)},
-          {"raw", points(run.dead_reckoned, 10)},
-          {"ekf", points(harness::poses_of(run.ekf), 1)},
-          {"slam", points(harness::poses_of(run.slam), 1)},
+  return {{"truth", points(run.truth, 100'000)},
+          {"raw", points(run.dead_reckoned, 100'000)},
+          {"ekf", points(harness::poses_of(run.ekf), 0)},
+          {"slam", points(harness::poses_of(run.slam), 0)},
           {"landmarks", landmarks},
           {"landmarks_used", counts}};
 }

@@ -1,11 +1,14 @@
 // `understory eval recording`: a recorded drive through the whole chain, against the reference that
 // the log carries.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <ranges>
 
 #include "common/io/lcm_log.hpp"
 #include "common/terminal/interrupt.hpp"
@@ -56,6 +59,14 @@ void watch_pictures(harness::SensorChain& chain, Recording& recording) {
                                    });
 }
 
+/// Rows of a chain that heard nothing would look like those of a drive on which nothing was found.
+void refuse_unfed(const Options& options, const std::map<std::string, bool>& taken) {
+  if (std::ranges::any_of(taken, [](const auto& channel) { return channel.second; })) return;
+  throw io::LogError(fmt::format("{}: no channel of it is an input of the stages of {}; it has {}",
+                                 options.log, options.config_dir,
+                                 fmt::join(std::views::keys(taken), " ")));
+}
+
 Recording drive_recording(const Options& options, const std::atomic<bool>& stop) {
   Recording recording;
   harness::SensorChain chain(harness::services_of(options.config_dir), options.config_dir);
@@ -70,6 +81,7 @@ Recording drive_recording(const Options& options, const std::atomic<bool>& stop)
       geometry::SE2(options.reference[0], options.reference[1], options.reference[2]).inverse();
   std::uint64_t position = 0;
   std::optional<model::Utime> begin;
+  std::map<std::string, bool> taken;  ///< By channel of the log: whether the chain takes it.
   while (const auto event = reader.next()) {
     if (stop) throw std::runtime_error("interrupted");
     begin = begin.value_or(event->utime);
@@ -85,12 +97,14 @@ Recording drive_recording(const Options& options, const std::atomic<bool>& stop)
         recording.fixes.push_back(*fix);
     }
 
-    if (event->channel.starts_with("RAW_")) chain.feed(event->channel, event->data);
+    const auto known = taken.try_emplace(event->channel, chain.takes(event->channel)).first;
+    if (known->second) chain.feed(event->channel, event->data);
     progress.advance(reader.position_bytes() - position);
     position = reader.position_bytes();
   }
 
   reader.refuse_other_files();
+  refuse_unfed(options, taken);
   finish_chain(chain, recording.run);
   recording.run.sweeps = recording.run.detections.size();
   return recording;
@@ -219,9 +233,11 @@ void run(Options options) {
 
 void add_recording_experiment(CLI::App& eval) {
   auto* command = eval.add_subcommand(
-      "recording", "A recorded drive (a log of `understory import`) through the whole chain");
+      "recording",
+      "A recorded drive (any log of `understory import`) through the chain of a configuration");
   auto options = std::make_shared<Options>();
-  command->add_option("log", options->log, "Log with the raw channels")->required();
+  command->add_option("log", options->log, "Log with the channels that the chain of --config takes")
+      ->required();
   command->add_option("--name", options->name, "In tables and pictures; default the file's");
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
