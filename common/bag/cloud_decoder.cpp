@@ -47,9 +47,9 @@ constexpr double kFinestShare = 0.01;
 
 /// Unit [s] of times that lie `spread` apart: nanoseconds of integers, seconds of floats, unless a
 /// sweep cannot last so long and another unit gives it a possible length.
-double time_unit(double spread, std::uint8_t type) {
-  constexpr std::uint8_t kFloat32 = 7;
-  const double usual = type >= kFloat32 ? 1.0 : 1e-9;
+double time_unit(double spread, FieldType type) {
+  const bool is_float = type == FieldType::kFloat32 || type == FieldType::kFloat64;
+  const double usual = is_float ? 1.0 : 1e-9;
   if (spread * usual >= kShortestPacket_s && spread * usual <= kLongestRevolution_s) return usual;
   for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
     if (spread * unit >= kShortestRevolution_s && spread * unit <= kLongestRevolution_s)
@@ -182,25 +182,23 @@ model::PointSweep CloudDecoder::decode(const LivoxCloud& cloud) {
 
 /// From the first cloud whose points have different times.
 void CloudDecoder::decide_time(const std::vector<RawPoint>& points, std::int64_t stamp_ns,
-                               std::uint8_t type) {
+                               FieldType type) {
   if (unit_s_ || points.empty()) return;
   const auto [first, last] = std::ranges::minmax(points, {}, &RawPoint::time);
   const double spread = last.time - first.time;
   if (spread <= 0.0) return;
   // Seconds since 1970 do not fit into a float: what it holds are steps of two minutes.
-  constexpr std::uint8_t kFloat32 = 7;
   constexpr double kRelativeStep = 1.2e-7;
   const double step = kRelativeStep * std::max(std::abs(first.time), std::abs(last.time));
-  is_too_coarse_ = type == kFloat32 && step > kFinestShare * spread;
+  is_too_coarse_ = type == FieldType::kFloat32 && step > kFinestShare * spread;
   if (is_too_coarse_) return;
 
   unit_s_ = options_.time_unit_s ? *options_.time_unit_s : time_unit(spread, type);
   const double middle_s = 0.5 * (first.time + last.time) * *unit_s_;
   const double from_stamp_s = middle_s - 1e-9 * static_cast<double>(stamp_ns);
   // Of a short drive's own clock only doubles have the digits for a time near the stamp.
-  constexpr std::uint8_t kFloat64 = 8;
   is_absolute_ = std::abs(middle_s) > kRelative_s ||
-                 (type == kFloat64 && std::abs(from_stamp_s) < std::abs(middle_s));
+                 (type == FieldType::kFloat64 && std::abs(from_stamp_s) < std::abs(middle_s));
   is_own_clock_ = is_absolute_ && std::abs(from_stamp_s) > kSameClock_s;
 }
 

@@ -50,7 +50,7 @@ class CloudDecoder {
   struct Layout;
 
   Layout layout_of(const PointCloud& cloud) const;
-  void decide_time(const std::vector<RawPoint>& points, std::int64_t stamp_ns, std::uint8_t type);
+  void decide_time(const std::vector<RawPoint>& points, std::int64_t stamp_ns, FieldType type);
   void decide_rings(const std::vector<RawPoint>& points);
   void decide_intensity(const std::vector<RawPoint>& points, bool is_integer);
   std::uint16_t ring_of(std::uint32_t ring) const;

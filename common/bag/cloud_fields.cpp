@@ -12,9 +12,10 @@
 namespace understory::bag {
 namespace {
 
-constexpr std::array<std::size_t, 9> kTypeBytes{0, 1, 1, 2, 2, 4, 4, 4, 8};
-constexpr std::array<std::string_view, 9> kTypeNames{
-    "?", "int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"};
+constexpr std::array<std::size_t, 11> kTypeBytes{0, 1, 1, 2, 2, 4, 4, 4, 8, 8, 8};
+constexpr std::array<std::string_view, 11> kTypeNames{"?",       "int8",  "uint8",  "int16",
+                                                      "uint16",  "int32", "uint32", "float32",
+                                                      "float64", "int64", "uint64"};
 
 constexpr std::uint64_t kMostPoints = 20'000'000;
 
@@ -39,19 +40,23 @@ std::string FieldReader::type_name() const { return field_type_name(field_.type)
 
 std::int64_t FieldReader::integer(const std::uint8_t* point) const {
   const std::uint8_t* at = point + field_.offset;
-  switch (field_.type) {
-    case 1:
+  switch (type()) {
+    case FieldType::kInt8:
       return number_from<std::int8_t>(at, is_big_endian_);
-    case 2:
+    case FieldType::kUint8:
       return *at;
-    case 3:
+    case FieldType::kInt16:
       return number_from<std::int16_t>(at, is_big_endian_);
-    case 4:
+    case FieldType::kUint16:
       return number_from<std::uint16_t>(at, is_big_endian_);
-    case 5:
+    case FieldType::kInt32:
       return number_from<std::int32_t>(at, is_big_endian_);
-    case 6:
+    case FieldType::kUint32:
       return number_from<std::uint32_t>(at, is_big_endian_);
+    case FieldType::kInt64:
+      return number_from<std::int64_t>(at, is_big_endian_);
+    case FieldType::kUint64:
+      return static_cast<std::int64_t>(number_from<std::uint64_t>(at, is_big_endian_));
     default:
       return 0;
   }
@@ -59,8 +64,9 @@ std::int64_t FieldReader::integer(const std::uint8_t* point) const {
 
 double FieldReader::value(const std::uint8_t* point) const {
   const std::uint8_t* at = point + field_.offset;
-  if (field_.type == 7) return static_cast<double>(number_from<float>(at, is_big_endian_));
-  if (field_.type == 8) return number_from<double>(at, is_big_endian_);
+  if (type() == FieldType::kFloat32)
+    return static_cast<double>(number_from<float>(at, is_big_endian_));
+  if (type() == FieldType::kFloat64) return number_from<double>(at, is_big_endian_);
   return static_cast<double>(integer(point));
 }
 

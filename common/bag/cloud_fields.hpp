@@ -11,6 +11,20 @@
 
 namespace understory::bag {
 
+/// Types of a field: those of PointField, and two that PCD files have besides.
+enum class FieldType : std::uint8_t {
+  kInt8 = 1,
+  kUint8 = 2,
+  kInt16 = 3,
+  kUint16 = 4,
+  kInt32 = 5,
+  kUint32 = 6,
+  kFloat32 = 7,
+  kFloat64 = 8,
+  kInt64 = 9,
+  kUint64 = 10,
+};
+
 /// Reads one field of a point. It lies within the point: find_field() has checked it.
 class FieldReader {
  public:
@@ -23,8 +37,8 @@ class FieldReader {
   /// The same where the field has integers; of floats 0.
   std::int64_t integer(const std::uint8_t* point) const;
   /// Whether the field's type is one of integers.
-  bool is_integer() const { return field_.type >= 1 && field_.type <= 6; }
-  std::uint8_t type() const { return field_.type; }      ///< As PointField has it.
+  bool is_integer() const { return type() != FieldType::kFloat32 && type() != FieldType::kFloat64; }
+  FieldType type() const { return static_cast<FieldType>(field_.type); }
   std::string_view name() const { return field_.name; }  ///< Of the field.
   std::string type_name() const;                         ///< "float32".
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "deploy/cli/import_bag_list.hpp"
 #include "deploy/cli/import_bag_messages.hpp"
 #include "deploy/cli/import_bag_mounts.hpp"
+#include "deploy/cli/import_cloud.hpp"
 
 namespace understory::cli {
 namespace {
@@ -28,7 +28,6 @@ struct BagImportOptions {
   std::string base;
   std::vector<std::string> mounts;
   std::string config;
-  std::string point_time;
   std::vector<std::string> receive_time;
   BagConversion conversion;
 };
@@ -128,14 +127,10 @@ void import_chosen(const BagImportOptions& options, bag::Bag& bag, const bag::Su
   write_settings(options, settings);
 }
 
-void import_bag(BagImportOptions options) {
+void import_bag(const BagImportOptions& options) {
   if (options.is_list == !options.out.empty())
     wrong_usage("import bag: either --list or --out RUN.lcm");
   refuse_to_overwrite(options.path, options.out);
-  static const std::map<std::string, double> kUnits{
-      {"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
-  if (!options.point_time.empty())
-    options.conversion.cloud.time_unit_s = kUnits.at(options.point_time);
 
   const auto bag = bag::open_bag(options.path);
   try {
@@ -180,13 +175,7 @@ void add_readings(CLI::App& command, BagImportOptions& options) {
       .add_option("--receive-time", options.receive_time,
                   "Topic whose clock is wrong: its stamps are laid onto the recorder's clock")
       ->allow_extra_args(false);
-  command
-      .add_option("--point-time", options.point_time, "Unit of the points' times: s, ms, us or ns")
-      ->check(CLI::IsMember({"s", "ms", "us", "ns"}));
-  command
-      .add_option("--max-range", conversion.cloud.max_range_m, "Range of the laser in space [m]")
-      ->check(CLI::Range(1.0, 1000.0))
-      ->capture_default_str();
+  add_cloud_options(command, conversion.cloud);
   command
       .add_option("--model", conversion.velodyne_model,
                   "Of Velodyne packets: vlp16, vlp32c, hdl32e")

@@ -13,15 +13,13 @@
 #include "common/io/data_error.hpp"
 #include "common/io/kitti_raw.hpp"
 #include "common/io/packet_capture.hpp"
-#include "common/io/point_cloud_file.hpp"
-#include "common/io/recording_folder.hpp"
-#include "common/io/sensor_tables.hpp"
 #include "common/io/velodyne.hpp"
 #include "common/io/velodyne_fixes.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/guarded_import.hpp"
+#include "deploy/cli/import_tables.hpp"
 #include "deploy/cli/recording_log.hpp"
 #include "understory/ground_truth_t.hpp"
 
@@ -36,14 +34,8 @@ struct SensorImportOptions {
   std::vector<double> laser;  ///< x_m, y_m, yaw_rad on the vehicle; empty = KITTI's.
   std::string model = "vlp16";
   std::string calibration;
-  std::string imu, gnss, wheel_table;
+  SensorTables tables;
 };
-
-std::string read_recorded(const std::string& path) {
-  const std::filesystem::path file(path);
-  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-  return io::RecordingFolder(folder).read(file.filename().string());
-}
 
 ground_truth_t truth(model::Utime utime, const geometry::SE2& pose) {
   ground_truth_t message{};
@@ -159,56 +151,10 @@ void import_pcap(const SensorImportOptions& options) {
              capture.is_cut_off() ? ", the file is cut off" : "", options.out);
 }
 
-void add_tables(const SensorImportOptions& options, RecordingLog& log) {
-  if (!options.imu.empty()) {
-    for (const model::ImuSample& sample :
-         io::parse_imu_table(read_recorded(options.imu), options.imu))
-      log.add("RAW_IMU", sample);
-  }
-
-  if (!options.wheel_table.empty()) {
-    for (const model::WheelSample& sample :
-         io::parse_wheel_table(read_recorded(options.wheel_table), options.wheel_table))
-      log.add("RAW_WHEELS", sample);
-  }
-
-  if (!options.gnss.empty()) {
-    for (const model::GnssFix& fix :
-         io::parse_gnss_table(read_recorded(options.gnss), options.gnss))
-      log.add("RAW_GNSS", fix);
-  }
-}
-
-void report_tables(const RecordingLog& log, std::size_t sweeps, const std::string& out) {
-  fmt::print("{} sweeps, {} IMU samples, {} wheel samples, {} fixes -> {}\n", sweeps,
-             log.count("RAW_IMU"), log.count("RAW_WHEELS"), log.count("RAW_GNSS"), out);
-}
-
-void import_pcd(const SensorImportOptions& options) {
-  const std::vector<io::PcdFile> files = io::find_pcd_sequence(options.path);
-  RecordingLog log(options.out);
-  add_tables(options, log);
-  terminal::Progress progress("importing", static_cast<double>(files.size()));
-
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    terminal::throw_if_interrupted();
-    model::PointSweep sweep =
-        io::parse_pcd(read_recorded(files[i].path.string()), files[i].path.string());
-    sweep.utime = files[i].utime;
-    sweep.revolution = i;
-    log.add_sweep("RAW_SWEEP", sweep);
-    progress.update(static_cast<double>(i + 1));
-  }
-
-  log.commit();
-  report_tables(log, files.size(), options.out);
-}
-
 void import_csv(const SensorImportOptions& options) {
-  if (options.imu.empty() && options.gnss.empty() && options.wheel_table.empty())
-    fail("import csv: none of --imu, --gnss, --wheels is given");
+  if (options.tables.empty()) fail("import csv: none of --imu, --gnss, --wheels is given");
   RecordingLog log(options.out);
-  add_tables(options, log);
+  add_tables(options.tables, log);
   log.commit();
   report_tables(log, 0, options.out);
 }
@@ -224,14 +170,6 @@ CLI::App* add_format(CLI::App& import, const std::string& name, const std::strin
     guarded_import([&] { run(*options); });
   });
   return command;
-}
-
-void add_table_options(CLI::App& command, const std::shared_ptr<SensorImportOptions>& options) {
-  command.add_option("--imu", options->imu, "CSV: t_s,gx,gy,gz,ax,ay,az (rad/s, m/s^2)");
-  command.add_option("--gnss", options->gnss,
-                     "CSV: t_s, latitude_deg,longitude_deg or east_m,north_m, sigma_m, "
-                     "ve_mps,vn_mps,velocity_sigma_mps");
-  command.add_option("--wheels", options->wheel_table, "CSV: t_s,speed_mps,steering_rad");
 }
 
 }  // namespace
@@ -257,14 +195,9 @@ void add_sensor_imports(CLI::App& import) {
                               "A pcap or pcapng file", options, import_pcap);
   pcap->add_option("--model", options->model, "vlp16 (default), vlp32c, hdl32e or hdl64e");
   pcap->add_option("--calibration", options->calibration, "The HDL-64E's own XML or YAML file");
-  CLI::App* pcd =
-      add_format(import, "pcd", "A sequence of PCD files, one revolution each",
-                 "Folder; times from timestamps.txt or from the names", options, import_pcd);
-
-  add_table_options(*pcd, options);
   CLI::App* csv =
       add_format(import, "csv", "Tables of IMU, GNSS and wheels", "", options, import_csv);
-  add_table_options(*csv, options);
+  add_table_options(*csv, options->tables);
 }
 
 }  // namespace understory::cli

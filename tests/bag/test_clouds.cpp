@@ -258,9 +258,9 @@ TEST_CASE("bag clouds: what does not fit is refused", "[clouds]") {
       "does not lie");
   refused(
       [](auto& c) {
-        for (auto& f : c.fields) f.type = 9;
+        for (auto& f : c.fields) f.type = 11;
       },
-      "type 9");
+      "type 11");
   refused([](auto& c) { c.fields.clear(); }, "without the field x");
 
   fields.push_back({"timestamp", 8, [](const Truth& p) { return p.ring * 1e300; }});

@@ -1,4 +1,4 @@
-// KITTI drives, PCD files, packet captures and tables.
+// KITTI drives, packet captures and tables.
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -11,7 +11,6 @@
 #include "common/io/data_error.hpp"
 #include "common/io/kitti_raw.hpp"
 #include "common/io/packet_capture.hpp"
-#include "common/io/point_cloud_file.hpp"
 #include "common/io/sensor_tables.hpp"
 #include "tests/catch.hpp"
 #include "tests/data.hpp"
@@ -42,160 +41,7 @@ class Folder {
   fs::path path_;
 };
 
-template <class T>
-void append(std::string& bytes, const T& value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-struct TestPoint {
-  float x, y, z, intensity;
-  std::uint16_t ring;
-  double time;
-};
-
-std::vector<TestPoint> test_points() {
-  std::mt19937_64 random(1);
-  std::uniform_real_distribution<float> place(-40.0F, 40.0F);
-  std::vector<TestPoint> points;
-  for (int i = 0; i < 500; ++i)
-    points.push_back({place(random), place(random), place(random), static_cast<float>(i % 256),
-                      static_cast<std::uint16_t>(i % 16), 1e6 + 1e-4 * i});
-  return points;
-}
-
-const std::string kPcdHeader =
-    "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity ring timestamp\nSIZE 4 4 4 4 2 8\n"
-    "TYPE F F F F U F\nCOUNT 1 1 1 1 1 1\nWIDTH 500\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n"
-    "POINTS 500\nDATA ";
-
-std::string pcd(const std::string& kind) {
-  std::string text = kPcdHeader + kind + "\n";
-  const auto points = test_points();
-  if (kind == "ascii") {
-    for (const TestPoint& p : points) {
-      char line[200];
-      std::snprintf(line, sizeof line, "%.9g %.9g %.9g %g %d %.6f\n", p.x, p.y, p.z, p.intensity,
-                    p.ring, p.time);
-      text += line;
-    }
-    return text;
-  }
-
-  std::string body;
-  if (kind == "binary") {
-    for (const TestPoint& p : points) {
-      for (const float v : {p.x, p.y, p.z, p.intensity}) append(body, v);
-      append(body, p.ring);
-      append(body, p.time);
-    }
-    return text + body;
-  }
-
-  for (const TestPoint& p : points) append(body, p.x);
-  for (const TestPoint& p : points) append(body, p.y);
-  for (const TestPoint& p : points) append(body, p.z);
-  for (const TestPoint& p : points) append(body, p.intensity);
-  for (const TestPoint& p : points) append(body, p.ring);
-  for (const TestPoint& p : points) append(body, p.time);
-
-  // LZF with literals, and one back reference where bytes repeat.
-  std::string packed;
-  std::size_t at = 0;
-  while (at < body.size()) {
-    if (at >= 32 && at + 8 <= body.size() && body.compare(at, 8, body, at - 32, 8) == 0) {
-      packed.push_back(static_cast<char>(6U << 5U));
-      packed.push_back(31);
-      at += 8;
-      continue;
-    }
-    const std::size_t count = std::min<std::size_t>(4, body.size() - at);
-    packed.push_back(static_cast<char>(count - 1));
-    packed += body.substr(at, count);
-    at += count;
-  }
-
-  append(text, static_cast<std::uint32_t>(packed.size()));
-  append(text, static_cast<std::uint32_t>(body.size()));
-
-  return text + packed;
-}
-
-bool parses(const std::function<void()>& work) {
-  try {
-    work();
-    return true;
-  } catch (const DataError&) {
-    return false;
-  }
-}
-
 }  // namespace
-
-TEST_CASE("PCD files of every kind hold the same points", "[pcd]") {
-  const auto points = test_points();
-  for (const std::string kind : {"ascii", "binary", "binary_compressed"}) {
-    CAPTURE(kind);
-    const model::PointSweep sweep = parse_pcd(pcd(kind), "cloud.pcd");
-    REQUIRE(sweep.points.size() == points.size());
-    CHECK(sweep.has_times);
-    CHECK(sweep.rings == 16);
-
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      CHECK(sweep.points[i].x_m == Approx(points[i].x));
-      CHECK(sweep.points[i].z_m == Approx(points[i].z));
-      CHECK(sweep.points[i].ring == points[i].ring);
-      CHECK(sweep.points[i].intensity == static_cast<std::uint8_t>(points[i].intensity));
-      CHECK(sweep.points[i].time_s == Approx(1e-4 * static_cast<double>(i)).margin(1e-6));
-    }
-  }
-}
-
-TEST_CASE("LZF is unpacked to the size that is asked for, or refused", "[pcd]") {
-  // Three literals, then the same three and two more from a back reference.
-  const std::string packed{'\x02', 'a', 'b', 'c', '\x60', '\x02'};
-  CHECK(decompress_lzf(packed, 8, "cloud.pcd") == "abcabcab");
-  CHECK(decompress_lzf("", 0, "cloud.pcd").empty());
-
-  CHECK_THROWS_AS(decompress_lzf(packed, 9, "cloud.pcd"), DataError);  // too few
-  CHECK_THROWS_AS(decompress_lzf(packed, 7, "cloud.pcd"), DataError);  // too many
-  CHECK_THROWS_AS(decompress_lzf("", 8, "cloud.pcd"), DataError);
-  CHECK_THROWS_AS(decompress_lzf(packed.substr(0, 5), 8, "cloud.pcd"), DataError);
-  CHECK_THROWS_WITH(decompress_lzf(packed, 1'000'000, "cloud.pcd"),
-                    "cloud.pcd: more bytes than LZF can have packed");
-}
-
-TEST_CASE("a PCD file that is cut or damaged is refused or read, never worse", "[pcd]") {
-  std::mt19937_64 random(2);
-  for (const std::string kind : {"ascii", "binary", "binary_compressed"}) {
-    const std::string good = pcd(kind);
-    for (std::size_t size = 0; size + 40 < good.size(); size += 97)
-      CHECK_FALSE(parses([&] { parse_pcd(std::string_view(good).substr(0, size), "cut.pcd"); }));
-    for (int i = 0; i < 2000; ++i) {
-      std::string damaged = good;
-      for (int k = 0; k < 3; ++k) damaged[random() % damaged.size()] = static_cast<char>(random());
-      parses([&] { parse_pcd(damaged, "damaged.pcd"); });
-    }
-  }
-
-  CHECK_FALSE(parses([] {
-    parse_pcd("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS 99999999999\nDATA ascii\n",
-              "huge.pcd");
-  }));
-}
-
-TEST_CASE("a sequence of PCD files has its times from the names or from a table", "[pcd]") {
-  const Folder folder;
-  folder.write("a/1317042164.5.pcd", pcd("binary"));
-  folder.write("a/1317042164.4.pcd", pcd("binary"));
-  const auto named = find_pcd_sequence(folder.path() / "a");
-  REQUIRE(named.size() == 2);
-  CHECK(named[0].utime == 1'317'042'164'400'000);
-  folder.write("b/x.pcd", pcd("binary"));
-  CHECK_THROWS_AS(find_pcd_sequence(folder.path() / "b"), DataError);
-  folder.write("b/timestamps.txt", "12.25\n");
-  CHECK(find_pcd_sequence(folder.path() / "b")[0].utime == 12'250'000);
-  CHECK_THROWS_AS(find_pcd_sequence(folder.path() / "none"), DataError);
-}
 
 TEST_CASE("a KITTI drive is read with rings and times", "[kitti][recorded]") {
   const fs::path folder = test::recording("kitti_raw_drive0002");

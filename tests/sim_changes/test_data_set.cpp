@@ -1,8 +1,9 @@
 // A data set: written, read back, damaged.
 #include <fstream>
 
+#include "common/bag/cloud_decoder.hpp"
+#include "common/bag/pcd_file.hpp"
 #include "common/io/data_error.hpp"
-#include "common/io/point_cloud_file.hpp"
 #include "common/io/text_file.hpp"
 #include "sim/changes/data_set.hpp"
 #include "sim/changes/drive_tables.hpp"
@@ -99,7 +100,8 @@ TEST_CASE("what was written is read back equal") {
   CHECK(text_of_things(drive.things) == text_of_things(data.after.things));
 
   const auto file = reader.whole_file(1, "surface.pcd");
-  const model::PointSweep cloud = io::parse_pcd(io::read_whole_file(file), file.string());
+  const bag::PcdFile pcd = bag::parse_pcd(io::read_whole_file(file), file.string());
+  const model::PointSweep cloud = bag::CloudDecoder().decode(pcd.cloud);
   const auto sampled = sampled_surface(data.changed.copy().scene, data.changed.copy().built, 100.0);
   REQUIRE(cloud.points.size() == sampled.size());
   CHECK(cloud.points.back().position() == sampled.back().position_m);

@@ -1,0 +1,318 @@
+#include "common/bag/pcd_file.hpp"
+
+#include <fmt/format.h>
+#include <lzf.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <sstream>
+
+#include "common/bag/cloud_fields.hpp"
+#include "common/io/data_error.hpp"
+
+namespace understory::bag {
+namespace {
+
+constexpr std::uint64_t kMostPcdPoints = 20'000'000;
+constexpr std::string_view kPadding = "_";
+
+[[noreturn]] void refuse(std::string_view source, const std::string& what) {
+  throw io::DataError(fmt::format("{}: {}", source, what));
+}
+
+/// A column of the header: SIZE, TYPE and COUNT of one name.
+struct PcdField {
+  std::string name;
+  char type = 'F';
+  std::uint32_t bytes = 4;
+  std::uint32_t count = 1;
+
+  std::uint32_t size() const { return bytes * count; }
+};
+
+struct PcdHeader {
+  std::vector<PcdField> fields;
+  std::optional<std::uint64_t> width, height, points;
+  Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();
+  std::string data;     ///< ascii, binary, binary_compressed
+  std::size_t end = 0;  ///< Where the points start.
+};
+
+/// PointField's number of a type; 0 where there is none.
+std::uint8_t field_type(const PcdField& field) {
+  struct Known {
+    char type;
+    std::uint32_t bytes;
+    FieldType number;
+  };
+  constexpr std::array<Known, 10> kKnown{{{'I', 1, FieldType::kInt8},
+                                          {'U', 1, FieldType::kUint8},
+                                          {'I', 2, FieldType::kInt16},
+                                          {'U', 2, FieldType::kUint16},
+                                          {'I', 4, FieldType::kInt32},
+                                          {'U', 4, FieldType::kUint32},
+                                          {'F', 4, FieldType::kFloat32},
+                                          {'F', 8, FieldType::kFloat64},
+                                          {'I', 8, FieldType::kInt64},
+                                          {'U', 8, FieldType::kUint64}}};
+  for (const Known& known : kKnown) {
+    if (known.type == field.type && known.bytes == field.bytes)
+      return static_cast<std::uint8_t>(known.number);
+  }
+  return 0;
+}
+
+std::uint64_t count_in(std::istringstream& line, const std::string& key, std::string_view source) {
+  std::string word;
+  line >> word;
+  std::uint64_t value = 0;
+  const auto read = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (word.empty() || read.ec != std::errc{} || read.ptr != word.data() + word.size())
+    refuse(source, fmt::format("{} '{}' is no number", key, word));
+  return value;
+}
+
+Eigen::Isometry3d viewpoint_in(std::istringstream& line, std::string_view source) {
+  std::array<double, 7> v{};
+  for (double& value : v) line >> value;
+  const Eigen::Quaterniond turn(v[3], v[4], v[5], v[6]);
+  if (!line || !(std::abs(turn.norm() - 1.0) < 1e-3))
+    refuse(source, "VIEWPOINT is no place and direction (tx ty tz qw qx qy qz)");
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = turn.normalized().toRotationMatrix();
+  pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
+  return pose;
+}
+
+void check(PcdHeader& header, std::string_view source) {
+  if (header.fields.empty() || header.fields.size() > 256)
+    refuse(source, "no line FIELDS that could be");
+  for (const PcdField& field : header.fields) {
+    if (field.count == 0 || field.count > 4096 ||
+        (field.name != kPadding && field_type(field) == 0))
+      refuse(source, fmt::format("field {}: no type that a PCD file has", field.name));
+  }
+
+  if (!header.points) header.points = header.width.value_or(0) * header.height.value_or(1);
+  if (*header.points > kMostPcdPoints)
+    refuse(source, fmt::format("{} points, more than the {} that are read", *header.points,
+                               kMostPcdPoints));
+  // Of an organised cloud rows are beams: a shape that is not that of the points says nothing.
+  const std::uint64_t height = header.height.value_or(1);
+  const bool has_shape = height > 0 && height <= kMostPcdPoints && header.width &&
+                         *header.width <= kMostPcdPoints &&
+                         *header.width * height == *header.points;
+  if (!has_shape) {
+    header.height = 1;
+    header.width = header.points;
+  }
+}
+
+void read_line(std::istringstream& line, const std::string& key, std::string_view source,
+               PcdHeader& header) {
+  if (key == "FIELDS" || key == "COLUMNS") {
+    std::string name;
+    while (line >> name) header.fields.push_back({name});
+  } else if (key == "POINTS") {
+    header.points = count_in(line, key, source);
+  } else if (key == "WIDTH") {
+    header.width = count_in(line, key, source);
+  } else if (key == "HEIGHT") {
+    header.height = count_in(line, key, source);
+  } else if (key == "VIEWPOINT") {
+    header.viewpoint = viewpoint_in(line, source);
+  } else {
+    for (PcdField& field : header.fields) {
+      if (key == "SIZE") line >> field.bytes;
+      if (key == "TYPE") line >> field.type;
+      if (key == "COUNT") line >> field.count;
+    }
+  }
+}
+
+PcdHeader parse_header(std::string_view bytes, std::string_view source) {
+  PcdHeader header;
+  std::size_t at = 0;
+  while (at < bytes.size()) {
+    const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
+    std::istringstream line{std::string(bytes.substr(at, std::min<std::size_t>(end - at, 10000)))};
+    at = end + 1;
+    std::string key;
+    line >> key;
+    if (key != "DATA") {
+      read_line(line, key, source, header);
+      continue;
+    }
+    line >> header.data;
+    header.end = std::min(at, bytes.size());
+    check(header, source);
+    return header;
+  }
+  refuse(source, "no line DATA");
+}
+
+std::string unpack_lzf(std::string_view packed, std::uint64_t size, std::string_view source) {
+  // LZF makes at most 264 bytes of three: a larger size is wrong, found before allocating.
+  constexpr std::uint64_t kMost = std::numeric_limits<unsigned int>::max();
+  if (size > 100 * packed.size() + 100 || size > kMost || packed.size() > kMost)
+    refuse(source, "more bytes than LZF can have packed");
+  std::string out(size, '\0');
+  if (size == 0) return out;
+
+  const unsigned int unpacked =
+      packed.empty() ? 0
+                     : lzf_decompress(packed.data(), static_cast<unsigned int>(packed.size()),
+                                      out.data(), static_cast<unsigned int>(size));
+  if (unpacked != size) refuse(source, "compressed points are damaged or cut off");
+  return out;
+}
+
+/// Points field by field, as they are compressed, to point by point.
+std::vector<std::uint8_t> by_point(const PcdHeader& header, std::uint64_t point_bytes,
+                                   std::string_view by_field) {
+  std::vector<std::uint8_t> points(by_field.size());
+  std::size_t from = 0;
+  std::size_t offset = 0;
+  for (const PcdField& field : header.fields) {
+    for (std::uint64_t i = 0; i < *header.points; ++i) {
+      std::memcpy(points.data() + i * point_bytes + offset, by_field.data() + from, field.size());
+      from += field.size();
+    }
+    offset += field.size();
+  }
+  return points;
+}
+
+template <class T>
+std::optional<T> number_in(std::string_view word) {
+  T value{};
+  const auto read = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (read.ec != std::errc{} || read.ptr != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+template <class T>
+bool put_number(std::string_view word, std::uint8_t* at) {
+  auto value = number_in<T>(word);
+  if constexpr (std::is_integral_v<T>) {
+    // Some write whole numbers as 3.000.
+    const auto real = value ? std::nullopt : number_in<double>(word);
+    constexpr double kExact = 9e15;  // A double holds every whole number up to here.
+    constexpr auto kMost = std::min(kExact, static_cast<double>(std::numeric_limits<T>::max()));
+    constexpr double kLeast = std::is_signed_v<T> ? -kMost : 0.0;
+    if (real && *real == std::floor(*real) && *real >= kLeast && *real <= kMost)
+      value = static_cast<T>(*real);
+  }
+  if (!value) return false;
+  std::memcpy(at, &*value, sizeof *value);
+  return true;
+}
+
+/// One number of a text in its field's type.
+bool put_word(std::string_view word, std::uint8_t type, std::uint8_t* at) {
+  switch (static_cast<FieldType>(type)) {
+    case FieldType::kInt8:
+      return put_number<std::int8_t>(word, at);
+    case FieldType::kUint8:
+      return put_number<std::uint8_t>(word, at);
+    case FieldType::kInt16:
+      return put_number<std::int16_t>(word, at);
+    case FieldType::kUint16:
+      return put_number<std::uint16_t>(word, at);
+    case FieldType::kInt32:
+      return put_number<std::int32_t>(word, at);
+    case FieldType::kUint32:
+      return put_number<std::uint32_t>(word, at);
+    case FieldType::kFloat32:
+      return put_number<float>(word, at);
+    case FieldType::kFloat64:
+      return put_number<double>(word, at);
+    case FieldType::kInt64:
+      return put_number<std::int64_t>(word, at);
+    case FieldType::kUint64:
+      return put_number<std::uint64_t>(word, at);
+  }
+  return false;
+}
+
+std::vector<std::uint8_t> points_of_text(const PcdHeader& header, std::uint64_t point_bytes,
+                                         std::string_view text, std::string_view source) {
+  // A number and what parts it from the next one are two bytes: found before allocating.
+  std::uint64_t numbers = 0;
+  for (const PcdField& field : header.fields) numbers += field.count;
+  if (*header.points * numbers > text.size() / 2 + 1)
+    refuse(source, fmt::format("{} bytes of text for {} points", text.size(), *header.points));
+
+  std::vector<std::uint8_t> points(*header.points * point_bytes);
+  const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; };
+  std::size_t at = 0;
+  const auto next = [&] {
+    while (at < text.size() && is_space(text[at])) ++at;
+    const std::size_t begin = at;
+    while (at < text.size() && !is_space(text[at])) ++at;
+    return text.substr(begin, at - begin);
+  };
+
+  std::uint8_t* to = points.data();
+  for (std::uint64_t i = 0; i < *header.points; ++i) {
+    for (const PcdField& field : header.fields) {
+      for (std::uint32_t c = 0; c < field.count; ++c, to += field.bytes) {
+        const std::string_view word = next();
+        if (field.name != kPadding && !put_word(word, field_type(field), to))
+          refuse(source, fmt::format("'{}' at byte {} of the points is no number of field {}",
+                                     word.substr(0, 40), at - word.size(), field.name));
+      }
+    }
+  }
+  return points;
+}
+
+std::vector<std::uint8_t> points_of(const PcdHeader& header, std::uint64_t point_bytes,
+                                    std::string_view data, std::string_view source) {
+  const std::uint64_t size = *header.points * point_bytes;
+  if (header.data == "ascii") return points_of_text(header, point_bytes, data, source);
+
+  if (header.data == "binary") {
+    if (data.size() < size) refuse(source, fmt::format("{} of {} bytes", data.size(), size));
+    return {data.begin(), data.begin() + static_cast<std::ptrdiff_t>(size)};
+  }
+
+  if (header.data != "binary_compressed")
+    refuse(source, fmt::format("DATA {} is not known", header.data));
+  std::array<std::uint32_t, 2> sizes{};  // Packed, unpacked.
+  if (data.size() < sizeof sizes) refuse(source, "cut off");
+  std::memcpy(sizes.data(), data.data(), sizeof sizes);
+  if (sizes[1] != size || sizes[0] > data.size() - sizeof sizes)
+    refuse(source,
+           fmt::format("{} bytes for {} points of {}", sizes[1], *header.points, point_bytes));
+  return by_point(header, point_bytes,
+                  unpack_lzf(data.substr(sizeof sizes, sizes[0]), size, source));
+}
+
+}  // namespace
+
+PcdFile parse_pcd(std::string_view bytes, std::string_view source) {
+  const PcdHeader header = parse_header(bytes, source);
+  PcdFile file;
+  file.viewpoint = header.viewpoint;
+  for (const PcdField& field : header.fields) {
+    if (field.name != kPadding)
+      file.cloud.fields.push_back(
+          {field.name, file.cloud.point_step, field_type(field), field.count});
+    file.cloud.point_step += field.size();
+  }
+
+  file.points = points_of(header, file.cloud.point_step, bytes.substr(header.end), source);
+  file.cloud.height = static_cast<std::uint32_t>(*header.height);
+  file.cloud.width = static_cast<std::uint32_t>(*header.width);
+  file.cloud.row_step = file.cloud.width * file.cloud.point_step;
+  file.cloud.data = file.points;
+  return file;
+}
+
+}  // namespace understory::bag
