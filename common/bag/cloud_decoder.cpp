@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "common/bag/cloud_fields.hpp"
+#include "common/bag/ring_finder.hpp"
 #include "common/io/data_error.hpp"
 
 namespace understory::bag {
@@ -138,6 +139,7 @@ model::PointSweep CloudDecoder::decode(const PointCloud& cloud) {
     }
   }
 
+  const bool has_found = layout.ring_place == RingPlace::kNone && take_found_rings(points);
   if (layout.ring_place == RingPlace::kRow) rings_ = std::max(rings_, layout.rows.rows);
   if (layout.ring_place == RingPlace::kColumn) rings_ = std::max(rings_, layout.rows.columns);
   if (layout.time) {
@@ -145,12 +147,26 @@ model::PointSweep CloudDecoder::decode(const PointCloud& cloud) {
     time_text_ = time_text(*layout.time);
   }
   if (layout.intensity) decide_intensity(points, layout.intensity->is_integer());
-  ring_text_ = layout.ring_place == RingPlace::kField    ? std::string(layout.ring->name())
-               : layout.ring_place == RingPlace::kRow    ? "rows"
-               : layout.ring_place == RingPlace::kColumn ? "columns"
-                                                         : "none";
+  if (layout.ring_place == RingPlace::kField) ring_text_ = layout.ring->name();
+  if (layout.ring_place == RingPlace::kRow) ring_text_ = "rows";
+  if (layout.ring_place == RingPlace::kColumn) ring_text_ = "columns";
   return sweep_of(std::move(points), cloud.header, layout.time.has_value(),
-                  layout.ring_place != RingPlace::kNone);
+                  has_found || layout.ring_place != RingPlace::kNone);
+}
+
+/// Whether rings were found in a cloud that has none.
+bool CloudDecoder::take_found_rings(std::vector<RawPoint>& points) {
+  std::vector<Eigen::Vector3f> positions_m;
+  positions_m.reserve(points.size());
+  for (const RawPoint& point : points) positions_m.push_back(point.position_m);
+  const FoundRings found = find_rings(positions_m);
+  if (found.ring.empty()) return false;
+
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].ring = found.ring[i];
+  rings_ = std::max<std::uint32_t>(rings_, found.rings);
+  ring_order_ = RingOrder::kUpwards;
+  ring_text_ = fmt::format("not in the cloud, found from {}", found.from);
+  return true;
 }
 
 std::string CloudDecoder::time_text(const FieldReader& field) const {

@@ -27,7 +27,8 @@ struct CloudOptions {
 /// and another unit gives it 2 ms to 1.5 s. Numbers that are not near zero are absolute, by
 /// whatever clock; where that is not the stamp's (more than 10 s apart), the first point is at the
 /// stamp. A field that is always the same holds no times. Rings: `ring`, `line`, `channel`,
-/// `laser_id`, `ring_id`, or the row of an organised cloud; renumbered so that 0 is the lowest.
+/// `laser_id`, `ring_id`, or the row of an organised cloud; renumbered so that 0 is the lowest;
+/// where there are none, find_rings() looks for them in each cloud.
 /// Intensity: `reflectivity`, else `intensity`, `i`; 0 .. 255.
 class CloudDecoder {
  public:
@@ -51,6 +52,7 @@ class CloudDecoder {
 
   Layout layout_of(const PointCloud& cloud) const;
   void decide_time(const std::vector<RawPoint>& points, std::int64_t stamp_ns, FieldType type);
+  bool take_found_rings(std::vector<RawPoint>& points);
   void decide_rings(const std::vector<RawPoint>& points);
   void decide_intensity(const std::vector<RawPoint>& points, bool is_integer);
   std::uint16_t ring_of(std::uint32_t ring) const;

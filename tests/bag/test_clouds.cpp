@@ -205,7 +205,17 @@ TEST_CASE("bag clouds: fields that hold no times are said to", "[clouds]") {
   const auto made = make_cloud(random, points, fields);
   bag::CloudDecoder decoder;
   CHECK_FALSE(decoder.decode(made->cloud).has_times);
-  CHECK(decoder.decode(made->cloud).rings == 0);
+  CHECK(decoder.decode(made->cloud).rings == 16);
+  CHECK_THAT(decoder.description(), Catch::Matchers::Contains("found from elevations, 16"));
+
+  std::uniform_real_distribution<float> anywhere(-20.0F, 20.0F);
+  auto scattered = points;
+  for (Truth& point : scattered)
+    point.position_m = {anywhere(random), anywhere(random), anywhere(random)};
+  const auto ringless = make_cloud(random, scattered, fields);
+  bag::CloudDecoder other;
+  CHECK(other.decode(ringless->cloud).rings == 0);
+  CHECK_THAT(other.description(), Catch::Matchers::Contains("rings: none"));
 }
 
 TEST_CASE(
