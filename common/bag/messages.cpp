@@ -143,12 +143,18 @@ Imu read_imu(MessageReader& reader) {
   return imu;
 }
 
-Odometry read_odometry(MessageReader& reader) {
+bool is_twist_type(const std::string& type) {
+  return type == "geometry_msgs/TwistStamped" || type == "geometry_msgs/TwistWithCovarianceStamped";
+}
+
+Odometry read_odometry(MessageReader& reader, const std::string& type) {
   Odometry odometry;
   odometry.pose.header = read_header(reader);
-  odometry.pose.child_frame = read_frame(reader);
-  odometry.pose.pose = read_motion(reader);
-  reader.skip<double>(kCovariance6);
+  if (!is_twist_type(type)) {
+    odometry.pose.child_frame = read_frame(reader);
+    odometry.pose.pose = read_motion(reader);
+    reader.skip<double>(kCovariance6);
+  }
   odometry.velocity_mps = read_vector(reader);
   odometry.angular_rate_rad_s = read_vector(reader);
   return odometry;

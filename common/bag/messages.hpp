@@ -115,8 +115,10 @@ LivoxCloud read_livox_cloud(MessageReader& reader);
 LaserScan read_laser_scan(MessageReader& reader);
 /// sensor_msgs/Imu.
 Imu read_imu(MessageReader& reader);
-/// nav_msgs/Odometry.
-Odometry read_odometry(MessageReader& reader);
+/// nav_msgs/Odometry, or a message of a twist type: then the pose has its header alone.
+Odometry read_odometry(MessageReader& reader, const std::string& type);
+/// Whether the type is a velocity alone: TwistStamped, TwistWithCovarianceStamped.
+bool is_twist_type(const std::string& type);
 /// sensor_msgs/NavSatFix.
 NavSatFix read_nav_sat_fix(MessageReader& reader);
 /// velodyne_msgs/VelodyneScan.

@@ -12,6 +12,33 @@ void StaticTransforms::add(const Pose& parent_T_child) {
   links_[parent_T_child.child_frame] = {parent_T_child.header.frame, parent_T_child.pose};
 }
 
+void StaticTransforms::watch(const Pose& parent_T_child) {
+  if (parent_T_child.child_frame.empty() ||
+      parent_T_child.child_frame == parent_T_child.header.frame)
+    return;
+  constexpr double kMoved_m = 1e-3;
+  constexpr double kTurned_rad = 1e-4;
+  const auto [entry, is_new] = watched_.try_emplace(
+      parent_T_child.child_frame, Watched{{parent_T_child.header.frame, parent_T_child.pose}});
+  if (is_new) return;
+  const Eigen::Isometry3d apart =
+      entry->second.first.parent_T_child.inverse() * parent_T_child.pose;
+  // A NaN is no place either.
+  const bool is_same = parent_T_child.header.frame == entry->second.first.parent &&
+                       apart.translation().norm() <= kMoved_m &&
+                       Eigen::AngleAxisd(apart.linear()).angle() <= kTurned_rad;
+  entry->second.has_moved |= !is_same;
+}
+
+std::size_t StaticTransforms::take_watched() {
+  const std::size_t before = links_.size();
+  for (const auto& [child, seen] : watched_) {
+    if (!seen.has_moved) links_.try_emplace(child, seen.first);
+  }
+  watched_.clear();
+  return links_.size() - before;
+}
+
 std::vector<std::pair<std::string, Eigen::Isometry3d>> StaticTransforms::ancestors(
     const std::string& frame) const {
   std::vector<std::pair<std::string, Eigen::Isometry3d>> chain{

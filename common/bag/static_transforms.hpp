@@ -1,4 +1,4 @@
-// Where frames lie on a vehicle, from /tf_static.
+// Where frames lie on a vehicle, from /tf_static, and from what never moves in /tf.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -16,6 +16,11 @@ class StaticTransforms {
  public:
   /// A transform; a later one of the same child replaces it.
   void add(const Pose& parent_T_child);
+  /// A transform that is sent again and again (/tf): it counts where it stays the same in all of
+  /// the recording (1 mm, 0.1 mrad) and add() has none of its child.
+  void watch(const Pose& parent_T_child);
+  /// Takes the watched ones that did not move among the others; the number of those taken.
+  std::size_t take_watched();
   /// Takes coordinates of `from` to `to`; none where no chain joins them.
   std::optional<Eigen::Isometry3d> find(const std::string& to, const std::string& from) const;
   /// Whether the tree names it.
@@ -31,7 +36,13 @@ class StaticTransforms {
   /// The frame's ancestors, itself first, each with the transform from the frame to it.
   std::vector<std::pair<std::string, Eigen::Isometry3d>> ancestors(const std::string& frame) const;
 
+  struct Watched {
+    Link first;
+    bool has_moved = false;
+  };
+
   std::map<std::string, Link> links_;  ///< By child.
+  std::map<std::string, Watched> watched_;
 };
 
 }  // namespace understory::bag

@@ -37,6 +37,8 @@ class Differences {
   std::uint64_t step_ = 1;
 };
 
+bool is_static(const Topic& topic) { return topic.name.ends_with("tf_static"); }
+
 /// What is gathered of one topic beside its survey.
 struct Gathered {
   Differences differences;
@@ -57,7 +59,13 @@ void look_into(const Bag& bag, const Message& message, Survey& survey, TopicSurv
   const Role role = role_of(topic);
   MessageReader reader = reader_of(bag, message);
   if (role == Role::kTransforms) {
-    for (const Pose& transform : read_transforms(reader)) survey.transforms.add(transform);
+    for (const Pose& transform : read_transforms(reader)) {
+      if (is_static(topic)) {
+        survey.transforms.add(transform);
+      } else {
+        survey.transforms.watch(transform);
+      }
+    }
     return;
   }
 
@@ -80,13 +88,13 @@ Role role_of(const Topic& topic) {
   static const std::map<std::string, Role> kRoles{
       {"sensor_msgs/PointCloud2", Role::kCloud},     {"livox_ros_driver/CustomMsg", Role::kCloud},
       {"livox_ros_driver2/CustomMsg", Role::kCloud}, {"velodyne_msgs/VelodyneScan", Role::kCloud},
+      {"tf2_msgs/TFMessage", Role::kTransforms},     {"tf/tfMessage", Role::kTransforms},
       {"sensor_msgs/LaserScan", Role::kScan},        {"sensor_msgs/Imu", Role::kImu},
       {"nav_msgs/Odometry", Role::kOdometry},        {"sensor_msgs/NavSatFix", Role::kGnss}};
   if (topic.encoding == Encoding::kOther) return Role::kNone;
-  if (topic.type == "tf2_msgs/TFMessage" && topic.name.ends_with("tf_static"))
-    return Role::kTransforms;
   const auto role = kRoles.find(topic.type);
   if (role != kRoles.end()) return role->second;
+  if (is_twist_type(topic.type)) return Role::kTwist;
   return is_pose_type(topic.type) ? Role::kPose : Role::kNone;
 }
 
@@ -128,6 +136,7 @@ Survey survey(Bag& bag, const CloudOptions& options,
     if (progress) progress(++read);
   }
 
+  result.transforms.take_watched();
   for (auto& [topic, of_topic] : gathered)
     result.topics[topic].stamp_minus_received_s = of_topic.differences.median_s();
   bag.rewind({});

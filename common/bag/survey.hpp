@@ -15,13 +15,14 @@ namespace understory::bag {
 /// What the messages of a type can become.
 enum class Role : std::uint8_t {
   kNone,
-  kCloud,     ///< PointCloud2, Livox CustomMsg, VelodyneScan.
-  kScan,      ///< LaserScan.
-  kImu,       ///< Imu.
-  kOdometry,  ///< Odometry; also a pose.
-  kGnss,      ///< NavSatFix.
-  kPose,      ///< A reference of the pose.
-  kTransforms,
+  kCloud,       ///< PointCloud2, Livox CustomMsg, VelodyneScan.
+  kScan,        ///< LaserScan.
+  kImu,         ///< Imu.
+  kOdometry,    ///< Odometry; also a pose.
+  kTwist,       ///< A velocity alone.
+  kGnss,        ///< NavSatFix.
+  kPose,        ///< A reference of the pose.
+  kTransforms,  ///< Transforms, static ones and others.
 };
 /// The role of a topic; kNone of types and encodings that are not read.
 Role role_of(const Topic& topic);
@@ -45,7 +46,7 @@ struct TopicSurvey {
 /// What was found in all topics that have a role.
 struct Survey {
   std::vector<TopicSurvey> topics;  ///< In the order of Bag::topics().
-  StaticTransforms transforms;      ///< Of all topics named .../tf_static.
+  StaticTransforms transforms;      ///< Of .../tf_static, and those of /tf that do not move.
 };
 
 /// Reads the messages of all topics that have a role, their headers alone but for the first clouds.

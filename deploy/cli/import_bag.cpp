@@ -152,7 +152,7 @@ void add_choices(CLI::App& command, BagImportOptions& options) {
   command.add_option("--imu", topics.imu, "Topic of the IMU; likewise");
   command.add_option("--gnss", topics.gnss, "Topic of the fixes; likewise");
   command.add_option("--odometry", topics.odometry,
-                     "Odometry of the wheels: its speed becomes RAW_WHEELS");
+                     "Odometry of the wheels, or a twist: its speed becomes RAW_WHEELS");
   command.add_option("--truth", topics.truth, "Poses of a reference: GROUND_TRUTH");
 }
 

@@ -154,7 +154,10 @@ void BagMessages::take_imu(const bag::Message& message) {
 
 void BagMessages::take_odometry(const bag::Message& message) {
   bag::MessageReader reader = reader_of(bag_, message);
-  const bag::Odometry odometry = read_odometry(reader);
+  const std::string& type = bag_.topics()[message.topic].type;
+  if (conversion_.has_speed_from_pose && bag::is_twist_type(type))
+    throw io::DataError("--speed-from-pose: " + type + " has no pose");
+  const bag::Odometry odometry = read_odometry(reader, type);
   const bag::Pose& pose = odometry.pose;
   double speed_mps = odometry.velocity_mps.x();
   double rate_rad_s = odometry.angular_rate_rad_s.z();

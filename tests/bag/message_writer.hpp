@@ -103,6 +103,15 @@ inline MessageBytes odometry_message(const Serialisation& how, const bag::Odomet
   return writer.bytes();
 }
 
+/// TwistStamped; with the covariance TwistWithCovarianceStamped.
+inline MessageBytes twist_message(const Serialisation& how, const bag::Odometry& odometry,
+                                  bool has_covariance) {
+  MessageWriter writer(how);
+  writer.header(odometry.pose.header).numbers(std::span(odometry.velocity_mps.data(), 3));
+  writer.numbers(std::span(odometry.angular_rate_rad_s.data(), 3));
+  return writer.zeros(has_covariance ? 36 : 0).bytes();
+}
+
 inline MessageBytes pose_message(const Serialisation& how, const bag::Pose& pose) {
   return MessageWriter(how).header(pose.header).pose(pose.pose).bytes();
 }

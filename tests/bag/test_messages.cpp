@@ -84,12 +84,22 @@ TEST_CASE("bag messages: IMU, odometry, fix and poses come back") {
           random_vector(random)};
       const MessageBytes odometry_bytes = odometry_message(how, odometry);
       bag::MessageReader odometry_reader(odometry_bytes, how.encoding);
-      const bag::Odometry odometry_found = read_odometry(odometry_reader);
+      const bag::Odometry odometry_found = read_odometry(odometry_reader, "nav_msgs/Odometry");
       check_header(odometry_found.pose.header, odometry.pose.header);
       CHECK(odometry_found.pose.child_frame == odometry.pose.child_frame);
       CHECK(odometry_found.pose.pose.isApprox(odometry.pose.pose, 1e-12));
       CHECK(odometry_found.velocity_mps == odometry.velocity_mps);
       CHECK(odometry_found.angular_rate_rad_s == odometry.angular_rate_rad_s);
+      for (const bool has_covariance : {false, true}) {
+        const MessageBytes bytes = twist_message(how, odometry, has_covariance);
+        bag::MessageReader reader(bytes, how.encoding);
+        const bag::Odometry twist =
+            read_odometry(reader, has_covariance ? "geometry_msgs/TwistWithCovarianceStamped"
+                                                 : "geometry_msgs/TwistStamped");
+        check_header(twist.pose.header, odometry.pose.header);
+        CHECK(twist.velocity_mps == odometry.velocity_mps);
+        CHECK(twist.angular_rate_rad_s == odometry.angular_rate_rad_s);
+      }
       bag::MessageReader as_pose(odometry_bytes, how.encoding);
       CHECK(read_pose(as_pose, "nav_msgs/Odometry").pose.isApprox(odometry.pose.pose, 1e-12));
 
@@ -106,7 +116,8 @@ TEST_CASE("bag messages: IMU, odometry, fix and poses come back") {
 
       if (round > 2) continue;
       check_cuts(how, imu_bytes, 9 * 8, [](auto& reader) { read_imu(reader); });
-      check_cuts(how, odometry_bytes, 36 * 8, [](auto& reader) { read_odometry(reader); });
+      check_cuts(how, odometry_bytes, 36 * 8,
+                 [](auto& reader) { read_odometry(reader, "nav_msgs/Odometry"); });
       check_cuts(how, fix_bytes, 0, [](auto& reader) { read_nav_sat_fix(reader); });
     }
   }
@@ -236,6 +247,18 @@ TEST_CASE("bag messages: static transforms join along any chain") {
   CHECK(transforms.find("laser", "laser")->isApprox(Eigen::Isometry3d::Identity()));
   CHECK_FALSE(transforms.find("base_link", "camera"));
   CHECK(transforms.has("mast"));
+
+  // What /tf repeats counts where it stays, unless /tf_static has it.
+  const auto radar = link("base_link", "radar");
+  auto moving = link("odom", "base_link");
+  for (int i = 0; i < 5; ++i) {
+    moving.pose.translation().x() += 0.1;
+    for (const auto& one : {radar, moving, link("mast", "laser")}) transforms.watch(one);
+  }
+  CHECK(transforms.take_watched() == 1);
+  CHECK(transforms.find("base_link", "radar")->isApprox(radar.pose, 1e-12));
+  CHECK_FALSE(transforms.has("odom"));
+  CHECK(transforms.find("mast", "laser")->isApprox(mast_laser.pose, 1e-12));
 
   // A circle ends.
   transforms.add(link("laser", "base_link"));

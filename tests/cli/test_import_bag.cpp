@@ -149,6 +149,35 @@ TEST_CASE("import bag: what is ambiguous is asked for by name", "[import]") {
   CHECK(stated.error.empty());
 }
 
+TEST_CASE("import bag: mounts that /tf repeats, speed of a twist", "[import]") {
+  const BagFolder folder;
+  const Serialisation cdr{bag::Encoding::kCdr, false};
+  std::vector<Recorded> messages;
+  for (std::int64_t i = 0; i < 20; ++i) {
+    const std::int64_t now = kStart_ns + i * 100'000'000;
+    messages.push_back(imu_at(now, now));
+    // As a publisher of static transforms does that knows no /tf_static.
+    const std::vector<bag::Pose> transforms{
+        frame_in("base_link", "imu", place(0.5, 0.0, 1.0)),
+        frame_in("odom", "base_link", place(0.1 * static_cast<double>(i), 0.0, 0.0))};
+    messages.push_back({"/tf", "tf2_msgs/TFMessage", now, transforms_message(cdr, transforms)});
+    bag::Odometry odometry;
+    odometry.pose.header = {now, "base_link"};
+    odometry.velocity_mps.x() = 3.0;
+    messages.push_back(
+        {"/twist", "geometry_msgs/TwistStamped", now, twist_message(cdr, odometry, false)});
+  }
+  const std::string bag = folder.write({BagForm::Kind::kMcap}, messages);
+  CHECK_THAT(folder.import(bag, "--list").out,
+             Contains("mount: imu on base_link: x 0.500 y 0.000 z 1.000 m") &&
+                 Contains("--odometry /twist"));
+  const Outcome outcome = folder.import(bag, "--odometry /twist --out " + folder.path("run.lcm"));
+  CHECK_THAT(outcome.out, Contains("20 wheel samples") && Contains("x_m = 0.500000"));
+  CHECK(outcome.error.empty());
+  folder.refused(bag, "--odometry /twist --speed-from-pose",
+                 "geometry_msgs/TwistStamped has no pose");
+}
+
 TEST_CASE("import bag: clocks that differ are named and laid onto the recorder's", "[import]") {
   const BagFolder folder;
   std::vector<Recorded> messages;
