@@ -45,6 +45,12 @@ add_library(understory_pcap INTERFACE)
 target_include_directories(understory_pcap INTERFACE "${PCAP_INCLUDE_DIR}")
 target_link_libraries(understory_pcap INTERFACE "${PCAP_LIBRARY}")
 
+find_path(PROJ_INCLUDE_DIR proj.h REQUIRED)
+find_library(PROJ_LIBRARY proj REQUIRED)
+add_library(understory_proj INTERFACE)
+target_include_directories(understory_proj INTERFACE "${PROJ_INCLUDE_DIR}")
+target_link_libraries(understory_proj INTERFACE "${PROJ_LIBRARY}")
+
 # With the session extension, as Debian builds it.
 find_path(SQLITE_INCLUDE_DIR sqlite3.h REQUIRED)
 find_library(SQLITE_LIBRARY sqlite3 REQUIRED)
@@ -86,4 +92,4 @@ target_link_libraries(understory_bz2 INTERFACE "${BZ2_LIBRARY}")
 find_path(NANOFLANN_INCLUDE_DIR nanoflann.hpp REQUIRED)
 
 install(TARGETS understory_lcm understory_cholmod understory_zip understory_lzf understory_pcap understory_sqlite
-        understory_crypto understory_zlib understory_zstd understory_lz4 understory_bz2 EXPORT understory)
+        understory_crypto understory_zlib understory_zstd understory_lz4 understory_bz2 understory_proj EXPORT understory)

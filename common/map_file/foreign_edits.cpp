@@ -6,6 +6,7 @@
 
 #include "common/map_file/existence_rows.hpp"
 #include "common/map_file/map_rows.hpp"
+#include "common/map_file/reference_rows.hpp"
 #include "common/map_file/schema.hpp"
 
 namespace understory::map_file {
@@ -45,12 +46,8 @@ bool is_readable(const Connection& connection, std::uint32_t map_id, bool must_b
 }
 
 void renew_checksums(const Connection& connection, bool must_be_maps) {
-  Statement state =
-      connection.prepare("UPDATE understory_maps SET checksum = ?2 WHERE map_id = ?1");
   for (const std::uint32_t id : map_ids(connection)) {
-    if (!is_readable(connection, id, must_be_maps)) continue;
-    const std::string checksum = checksum_of(connection, id);
-    state.bind(std::int64_t{id}, std::string_view(checksum)).run();
+    if (is_readable(connection, id, must_be_maps)) state_checksum(connection, id);
   }
 }
 
@@ -59,6 +56,7 @@ void renew_checksums(const Connection& connection, bool must_be_maps) {
 bool is_as_recorded(const Connection& connection, const Connection& recorded) {
   const std::vector<std::uint32_t> ids = map_ids(connection);
   if (ids != map_ids(recorded)) return false;
+  if (select_reference(connection) != select_reference(recorded)) return false;
   for (const std::uint32_t id : ids) {
     const std::string checksum = checksum_of(connection, id);
     if (checksum != checksum_of(recorded, id) || checksum != stated_checksum(connection, id))

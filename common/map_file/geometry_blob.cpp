@@ -108,13 +108,13 @@ std::optional<std::vector<Eigen::Vector2d>> points_of(GeometryKind kind, BlobRea
 
 }  // namespace
 
-std::vector<std::uint8_t> geometry_blob(const Geometry& geometry) {
+std::vector<std::uint8_t> geometry_blob(const Geometry& geometry, std::int32_t srs_id) {
   const bool is_point = geometry.kind == GeometryKind::kPoint;
   const bool is_polygon = geometry.kind == GeometryKind::kPolygon;
   BlobWriter out;
   for (const char c : {'G', 'P', '\0'}) out.add(c);
   out.add(static_cast<std::uint8_t>(kLittleEndian | (is_point ? 0U : kEnvelopeXy)));
-  out.add(kCartesian);
+  out.add(srs_id);
 
   if (!is_point) {
     const Box box = box_of(geometry);
@@ -133,8 +133,8 @@ std::vector<std::uint8_t> geometry_blob(const Geometry& geometry) {
   return out.take();
 }
 
-std::vector<std::uint8_t> point_blob(const Eigen::Vector2d& position_m) {
-  return geometry_blob({GeometryKind::kPoint, {position_m}});
+std::vector<std::uint8_t> point_blob(const Eigen::Vector2d& position_m, std::int32_t srs_id) {
+  return geometry_blob({GeometryKind::kPoint, {position_m}}, srs_id);
 }
 
 std::optional<Geometry> geometry_of(std::span<const std::uint8_t> blob) {

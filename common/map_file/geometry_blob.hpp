@@ -11,6 +11,8 @@ namespace understory::map_file {
 
 /// The number of the spatial reference system "undefined Cartesian": metres in a frame of our own.
 inline constexpr std::int32_t kCartesian = -1;
+/// The number of the system that places the frame of maps on the earth (reference_rows.hpp).
+inline constexpr std::int32_t kMapFrame = 990001;
 
 /// Kinds of geometry that the layers have, with their numbers in well-known binary.
 enum class GeometryKind : std::uint32_t { kPoint = 1, kLine = 2, kPolygon = 3 };
@@ -27,10 +29,11 @@ struct Box {
   Eigen::Vector2d high_m = Eigen::Vector2d::Zero();
 };
 
-/// Little endian, in kCartesian; with an envelope unless it is a point.
-std::vector<std::uint8_t> geometry_blob(const Geometry& geometry);
+/// Little endian, with the number of its reference system; with an envelope unless it is a point.
+std::vector<std::uint8_t> geometry_blob(const Geometry& geometry, std::int32_t srs_id = kCartesian);
 /// The same for a point.
-std::vector<std::uint8_t> point_blob(const Eigen::Vector2d& position_m);
+std::vector<std::uint8_t> point_blob(const Eigen::Vector2d& position_m,
+                                     std::int32_t srs_id = kCartesian);
 
 /// What the bytes hold: either order of bytes, any reference system. None where they are damaged,
 /// empty, of another kind or dimension, or a polygon with holes.

@@ -1,6 +1,7 @@
 #include "common/map_file/layer_rows.hpp"
 
 #include "common/map_file/geometry_blob.hpp"
+#include "common/map_file/reference_rows.hpp"
 
 namespace understory::map_file {
 namespace {
@@ -23,11 +24,12 @@ LandmarkRows::LandmarkRows(const Connection& connection, SameLandmark same)
           std::string(same == SameLandmark::kReplaced ? "INSERT OR REPLACE" : "INSERT") +
           " INTO landmarks (landmark_id, geom, map_id, submap_id, covariance_xx_m2, "
           "covariance_xy_m2, covariance_yy_m2, diameter_m, kind, times_seen, existence) "
-          "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)")) {}
+          "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)")),
+      srs_id_(srs_of_layers(connection)) {}
 
 void LandmarkRows::put(std::uint32_t map_id, const StoredLandmark& one) {
   const model::MapLandmark& landmark = one.landmark;
-  const auto point = point_blob(landmark.position_m);
+  const auto point = point_blob(landmark.position_m, srs_id_);
   const auto& covariance = landmark.covariance_m2;
   std::optional<std::int64_t> submap;
   if (one.submap_id) submap = signed_of(*one.submap_id);
@@ -47,10 +49,11 @@ KeyframeRows::KeyframeRows(const Connection& connection)
           "INSERT OR REPLACE INTO trajectory (fid, geom, map_id, sequence, utime, heading_rad, "
           "covariance_xx_m2, covariance_xy_m2, covariance_yy_m2, covariance_xt_m_rad, "
           "covariance_yt_m_rad, covariance_tt_rad2) "
-          "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)")) {}
+          "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)")),
+      srs_id_(srs_of_layers(connection)) {}
 
 void KeyframeRows::put(std::int64_t number, std::uint32_t map_id, const model::KeyframePose& pose) {
-  const auto point = point_blob(pose.map_T_vehicle.translation());
+  const auto point = point_blob(pose.map_T_vehicle.translation(), srs_id_);
   const auto& covariance = pose.covariance;
   insert_
       .bind(number, Blob(point), std::int64_t{map_id}, signed_of(pose.keyframe_sequence),
@@ -62,19 +65,21 @@ void KeyframeRows::put(std::int64_t number, std::uint32_t map_id, const model::K
 
 BorderRows::BorderRows(const Connection& connection)
     : insert_(connection.prepare("INSERT OR REPLACE INTO submap_borders (fid, geom, map_id, "
-                                 "submap_id) VALUES (?1, ?2, ?3, ?4)")) {}
+                                 "submap_id) VALUES (?1, ?2, ?3, ?4)")),
+      srs_id_(srs_of_layers(connection)) {}
 
 void BorderRows::put(std::int64_t number, std::uint32_t map_id, const SubmapBorder& border) {
-  const auto polygon = geometry_blob({GeometryKind::kPolygon, border.corners_m});
+  const auto polygon = geometry_blob({GeometryKind::kPolygon, border.corners_m}, srs_id_);
   insert_.bind(number, Blob(polygon), std::int64_t{map_id}, signed_of(border.submap_id)).run();
 }
 
 LoopRows::LoopRows(const Connection& connection)
     : insert_(connection.prepare("INSERT OR REPLACE INTO loop_closures (fid, geom, map_id, "
-                                 "from_sequence, to_sequence) VALUES (?1, ?2, ?3, ?4, ?5)")) {}
+                                 "from_sequence, to_sequence) VALUES (?1, ?2, ?3, ?4, ?5)")),
+      srs_id_(srs_of_layers(connection)) {}
 
 void LoopRows::put(std::int64_t number, std::uint32_t map_id, const LoopClosure& loop) {
-  const auto line = geometry_blob({GeometryKind::kLine, {loop.from_m, loop.to_m}});
+  const auto line = geometry_blob({GeometryKind::kLine, {loop.from_m, loop.to_m}}, srs_id_);
   insert_
       .bind(number, Blob(line), std::int64_t{map_id}, signed_of(loop.from_sequence),
             signed_of(loop.to_sequence))

@@ -26,6 +26,7 @@ class LandmarkRows {
 
  private:
   Statement insert_;
+  std::int32_t srs_id_;
 };
 
 /// Writes keyframes; one of the same number is replaced.
@@ -38,6 +39,7 @@ class KeyframeRows {
 
  private:
   Statement insert_;
+  std::int32_t srs_id_;
 };
 
 /// Writes borders of submaps; one of the same number is replaced.
@@ -50,6 +52,7 @@ class BorderRows {
 
  private:
   Statement insert_;
+  std::int32_t srs_id_;
 };
 
 /// Writes loop closures; one of the same number is replaced.
@@ -62,6 +65,7 @@ class LoopRows {
 
  private:
   Statement insert_;
+  std::int32_t srs_id_;
 };
 
 }  // namespace understory::map_file

@@ -93,6 +93,13 @@ std::string stated_checksum(const Connection& connection, std::uint32_t map_id) 
   return row.bind(std::int64_t{map_id}).step() ? row.text(0) : std::string();
 }
 
+void state_checksum(const Connection& connection, std::uint32_t map_id) {
+  const std::string checksum = checksum_of(connection, map_id);
+  connection.prepare("UPDATE understory_maps SET checksum = ?2 WHERE map_id = ?1")
+      .bind(std::int64_t{map_id}, std::string_view(checksum))
+      .run();
+}
+
 void verify_checksum(const Connection& connection, std::uint32_t map_id) {
   if (checksum_of(connection, map_id) == stated_checksum(connection, map_id)) return;
   throw MapFileError(

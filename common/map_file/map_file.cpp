@@ -10,6 +10,7 @@
 #include "common/map_file/foreign_edits.hpp"
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/opening.hpp"
+#include "common/map_file/reference_rows.hpp"
 #include "common/map_file/schema.hpp"
 #include "common/map_file/submap_layers.hpp"
 
@@ -139,6 +140,10 @@ std::vector<model::LoopClosure> MapFile::closures(std::uint32_t map_id) const {
   return select_closures(*connection_, map_id);
 }
 
+std::optional<model::MapReference> MapFile::reference() const {
+  return select_reference(*connection_);
+}
+
 std::vector<Change> MapFile::history() const { return changes_in(*connection_); }
 
 std::vector<std::string> MapFile::check() const { return findings_in(*connection_); }
@@ -152,6 +157,14 @@ std::uint64_t MapFile::put(const StoredMap& map, const Placement& placement,
   return changed(*connection_, note, [&] {
     replace_maps(*connection_, {&map, 1});
     place(*connection_, map.map_id, placement);
+  });
+}
+
+std::uint64_t MapFile::put(const model::MapReference& reference, const ChangeNote& note) {
+  return changed(*connection_, note, [&] {
+    for (const std::uint32_t id : map_ids(*connection_)) verify_checksum(*connection_, id);
+    put_reference(*connection_, reference);
+    for (const std::uint32_t id : map_ids(*connection_)) state_checksum(*connection_, id);
   });
 }
 
@@ -183,7 +196,7 @@ std::uint64_t MapFile::accept(const ChangeNote& note) {
 }
 
 void create_map_file(const std::filesystem::path& file, std::span<const StoredMap> maps,
-                     const ChangeNote& note) {
+                     const ChangeNote& note, const std::optional<model::MapReference>& reference) {
   NewFile part(file);
   {
     Connection connection(part.path(), Access::kWrite, file);
@@ -191,6 +204,7 @@ void create_map_file(const std::filesystem::path& file, std::span<const StoredMa
     Transaction transaction(connection);
     create_schema(connection);
     Recording recording(connection);
+    if (reference) put_reference(connection, *reference);
     replace_maps(connection, maps);
     recording.write(note);
     refresh_contents(connection, note.utime);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "common/map_file/connection.hpp"
 #include "common/map_file/history.hpp"
 #include "common/map_file/stored_map.hpp"
+#include "common/model/map_reference.hpp"
 #include "common/model/submap.hpp"
 
 namespace understory::map_file {
@@ -66,6 +68,8 @@ class MapFile {
   std::vector<model::Submap> submaps(std::uint32_t map_id) const;
   /// Its loop closures that count, in the order in which they came, without covariances.
   std::vector<model::LoopClosure> closures(std::uint32_t map_id) const;
+  /// Where the frame of its maps lies on the earth; none where that is not known.
+  std::optional<model::MapReference> reference() const;
   /// All changes, the oldest first.
   std::vector<Change> history() const;
   /// All that is wrong with it, a line each: pages and indexes of SQLite, tables and rows that a
@@ -78,6 +82,9 @@ class MapFile {
   /// Likewise one map, with where its submaps are now: as one change, which revert() takes back
   /// whole. Fault::kRefused where a submap is none of the map's, or a closure's number is taken.
   std::uint64_t put(const StoredMap& map, const Placement& placement, const ChangeNote& note);
+  /// Says where the frame of all its maps lies on the earth; coordinates stay as they are. A
+  /// change, whose number it gives. O(features).
+  std::uint64_t put(const model::MapReference& reference, const ChangeNote& note);
   /// Brings all maps back to what they were after change `to` (0: before the first one), as a
   /// change of its own whose number it gives; it can be reverted, too. What other programs changed
   /// becomes a change before it. Fault::kRefused where there is no change `to`. O(all changes).
@@ -92,10 +99,11 @@ class MapFile {
   Access access_;
 };
 
-/// Makes a new file with these maps, as its first change: whole, or not at all. Links are followed.
-/// Fault::kRefused where something is there already. Killed in between, it leaves at most a file
-/// FILE.part-XXXXXX.
+/// Makes a new file with these maps, and with where their frame lies, as its first change: whole,
+/// or not at all. Links are followed. Fault::kRefused where something is there already. Killed in
+/// between, it leaves at most a file FILE.part-XXXXXX.
 void create_map_file(const std::filesystem::path& file, std::span<const StoredMap> maps,
-                     const ChangeNote& note);
+                     const ChangeNote& note,
+                     const std::optional<model::MapReference>& reference = std::nullopt);
 
 }  // namespace understory::map_file

@@ -147,10 +147,7 @@ void insert_map(const Connection& connection, const StoredMap& map) {
   insert_all(LoopRows(connection), map.map_id, map.loop_closures);
   if (map.existence) put_existence(connection, map.map_id, *map.existence);
 
-  const std::string checksum = checksum_of(connection, map.map_id);
-  connection.prepare("UPDATE understory_maps SET checksum = ?2 WHERE map_id = ?1")
-      .bind(std::int64_t{map.map_id}, std::string_view(checksum))
-      .run();
+  state_checksum(connection, map.map_id);
 }
 
 StoredMap select_map(const Connection& connection, std::uint32_t map_id) {

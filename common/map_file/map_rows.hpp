@@ -26,6 +26,8 @@ std::vector<std::uint32_t> map_ids(const Connection& connection);
 std::string checksum_of(const Connection& connection, std::uint32_t map_id);
 /// The checksum that the map's row states.
 std::string stated_checksum(const Connection& connection, std::uint32_t map_id);
+/// States the checksum that the map has now.
+void state_checksum(const Connection& connection, std::uint32_t map_id);
 /// Throws Fault::kDamaged naming the map where the two differ.
 void verify_checksum(const Connection& connection, std::uint32_t map_id);
 

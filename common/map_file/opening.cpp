@@ -62,6 +62,12 @@ bool can_be_written(const fs::path& file) {
          ::faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) == 0;
 }
 
+/// SQLite takes a last page that was cut for one with zeros at its end.
+void require_whole(const Connection& connection) {
+  const auto page = static_cast<std::uintmax_t>(connection.number("PRAGMA page_size"));
+  if (fs::file_size(connection.file()) % page != 0) connection.damaged("it was cut");
+}
+
 void check_keys(const Connection& connection) { connection.execute("PRAGMA foreign_keys = ON"); }
 
 /// The user's mask decides, as for any other file.
@@ -106,6 +112,7 @@ std::unique_ptr<Connection> open_at_rest(const fs::path& file) {
   check_keys(*connection);
   connection->execute("BEGIN");
   verify_schema(*connection);
+  require_whole(*connection);
   return connection;
 }
 
@@ -142,12 +149,14 @@ std::unique_ptr<Connection> open_to_read(const fs::path& file) {
 
 std::unique_ptr<Connection> open_to_write(const fs::path& file) {
   require_database(file);
+  const bool is_alone = left_beside(target_of(file)).empty();
   auto connection = std::make_unique<Connection>(file, Access::kWrite, file);
   // Before the first look at it: then the log's index is in memory, and locks stay.
   connection->execute("PRAGMA locking_mode = EXCLUSIVE");
   check_keys(*connection);
   // A file that is not ours is not touched.
   verify_schema(*connection);
+  if (is_alone) require_whole(*connection);
   if (sqlite3_db_readonly(connection->handle(), "main") != 0)
     cannot(Fault::kReadOnly, connection->file(), "it cannot be written");
   require_own_sql(*connection);

@@ -4,6 +4,8 @@
 
 #include "common/map_file/existence_tables.hpp"
 #include "common/map_file/geometry_blob.hpp"
+#include "common/map_file/reference_rows.hpp"
+#include "common/map_file/sql_text.hpp"
 #include "common/map_file/submap_tables.hpp"
 
 namespace understory::map_file {
@@ -119,11 +121,17 @@ constexpr std::string_view kWgs84 =
     R"(GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AXIS["Latitude",NORTH],AXIS["Longitude",EAST],AUTHORITY["EPSG","4326"]])";
 
 /// OGC 12-128 (1.3), F.3: the index of a layer and the triggers that keep it. <t> is the layer,
-/// <i> its key.
+/// <i> its key, <e> an event.
 struct IndexPart {
   std::string_view suffix;
   std::string_view sql;
 };
+/// The events of update3 and update4, which are for a feature that gets another number. The
+/// standard has UPDATE of any column: then SQLite compiles ST_IsEmpty into each UPDATE, and a plain
+/// sqlite3, which has no such function, changes no attribute. `ON` begins a line, since GDAL takes
+/// " AFTER UPDATE OF ... ON " in update3 for an error of GeoPackage 1.0 and writes it anew.
+constexpr std::string_view kAnyUpdate = "AFTER UPDATE ON <t>";
+constexpr std::string_view kUpdateOfKey = "AFTER UPDATE OF <i>\nON <t>";
 constexpr IndexPart kIndexParts[] = {
     {"", "CREATE VIRTUAL TABLE rtree_<t>_geom USING rtree(id, minx, maxx, miny, maxy)"},
     {"_insert", R"(CREATE TRIGGER rtree_<t>_geom_insert AFTER INSERT ON <t>
@@ -151,7 +159,7 @@ END)"},
 BEGIN
   DELETE FROM rtree_<t>_geom WHERE id = OLD.<i>;
 END)"},
-    {"_update3", R"(CREATE TRIGGER rtree_<t>_geom_update3 AFTER UPDATE ON <t>
+    {"_update3", R"(CREATE TRIGGER rtree_<t>_geom_update3 <e>
   WHEN OLD.<i> != NEW.<i> AND
        (NEW.geom NOTNULL AND NOT ST_IsEmpty(NEW.geom))
 BEGIN
@@ -162,7 +170,7 @@ BEGIN
     ST_MinY(NEW.geom), ST_MaxY(NEW.geom)
   );
 END)"},
-    {"_update4", R"(CREATE TRIGGER rtree_<t>_geom_update4 AFTER UPDATE ON <t>
+    {"_update4", R"(CREATE TRIGGER rtree_<t>_geom_update4 <e>
   WHEN OLD.<i> != NEW.<i> AND
        (NEW.geom ISNULL OR ST_IsEmpty(NEW.geom))
 BEGIN
@@ -180,11 +188,12 @@ void replace_all(std::string& text, std::string_view mark, std::string_view by) 
     text.replace(at, mark.size(), by);
 }
 
-std::vector<SchemaObject> index_of(const Layer& layer) {
+std::vector<SchemaObject> index_of(const Layer& layer, std::int64_t version) {
   std::vector<SchemaObject> objects;
   objects.reserve(std::size(kIndexParts));
   for (const IndexPart& part : kIndexParts) {
     std::string sql(part.sql);
+    replace_all(sql, "<e>", version < 4 ? kAnyUpdate : kUpdateOfKey);
     replace_all(sql, "<t>", layer.table);
     replace_all(sql, "<i>", layer.key);
     objects.push_back({fmt::format("rtree_{}_geom{}", layer.table, part.suffix), std::move(sql)});
@@ -246,6 +255,15 @@ void state_version(const Connection& connection) {
       .run();
 }
 
+/// Those of the layers' indexes, in place of what is there.
+void renew_triggers(const Connection& connection) {
+  for (const SchemaObject& object : schema_objects()) {
+    if (!object.sql.starts_with("CREATE TRIGGER")) continue;
+    connection.execute("DROP TRIGGER IF EXISTS " + object.name);
+    connection.execute(object.sql);
+  }
+}
+
 [[noreturn]] void refuse_file(const Connection& connection, Fault fault, const std::string& why) {
   throw MapFileError(fault, fmt::format("{}: {}", connection.file().string(), why));
 }
@@ -287,13 +305,24 @@ std::vector<SchemaObject> schema_objects(std::int64_t version) {
   table("loop_closures", kLoopClosures);
 
   for (const Layer& layer : kLayers) {
-    for (SchemaObject& object : index_of(layer)) objects.push_back(std::move(object));
+    for (SchemaObject& object : index_of(layer, version)) objects.push_back(std::move(object));
   }
   if (version < 2) return objects;
   for (SchemaObject& object : submap_objects()) objects.push_back(std::move(object));
   if (version < 3) return objects;
   for (SchemaObject& object : existence_objects()) objects.push_back(std::move(object));
+  if (version < 4) return objects;
+  for (SchemaObject& object : reference_objects()) objects.push_back(std::move(object));
   return objects;
+}
+
+bool is_standard_trigger(std::string_view name, std::string_view sql) {
+  for (const Layer& layer : kLayers) {
+    for (const SchemaObject& object : index_of(layer, kOldestSchemaVersion))
+      if (object.name == name && object.sql.starts_with("CREATE TRIGGER"))
+        return is_same_sql(object.sql, sql);
+  }
+  return false;
 }
 
 void create_schema(const Connection& connection) {
@@ -305,6 +334,7 @@ void create_schema(const Connection& connection) {
   insert_layers(connection);
   register_submap_tables(connection);
   register_existence_tables(connection);
+  register_reference_table(connection);
   state_version(connection);
 }
 
@@ -321,8 +351,13 @@ void upgrade_schema(const Connection& connection) {
     for (const SchemaObject& object : submap_objects()) connection.execute(object.sql);
     register_submap_tables(connection);
   }
-  for (const SchemaObject& object : existence_objects()) connection.execute(object.sql);
-  register_existence_tables(connection);
+  if (version < 3) {
+    for (const SchemaObject& object : existence_objects()) connection.execute(object.sql);
+    register_existence_tables(connection);
+  }
+  renew_triggers(connection);
+  for (const SchemaObject& object : reference_objects()) connection.execute(object.sql);
+  register_reference_table(connection);
   state_version(connection);
   transaction.commit();
 }
@@ -346,6 +381,7 @@ void verify_schema(const Connection& connection) {
 }
 
 void refresh_contents(const Connection& connection, model::Utime utime) {
+  refresh_registration(connection);
   Statement stamp = connection.prepare(
       "UPDATE gpkg_contents SET last_change = strftime('%Y-%m-%dT%H:%M:%fZ', ?1, 'unixepoch')");
   stamp.bind(1e-6 * static_cast<double>(utime)).run();

@@ -14,10 +14,12 @@ namespace understory::map_file {
 
 /// The version of the schema that is written. One that adds or changes a table or a column gets the
 /// next number.
-inline constexpr std::int64_t kSchemaVersion = 3;
+inline constexpr std::int64_t kSchemaVersion = 4;
 /// The oldest version that is read. Version 1 has no submaps (submap_tables.hpp), versions 1
-/// and 2 no states of existence (existence_tables.hpp); who opens such a file to write makes it one
-/// of the version that is written, and changes nothing else.
+/// and 2 no states of existence (existence_tables.hpp), versions 1 to 3 no place on the earth
+/// (reference_rows.hpp), and triggers that end an UPDATE of other programs without functions for
+/// geometries. A file that is opened to write becomes one of the version that is written; nothing
+/// else in it changes.
 inline constexpr std::int64_t kOldestSchemaVersion = 1;
 /// PRAGMA application_id of a GeoPackage: "GPKG".
 inline constexpr std::int64_t kGeoPackage = 0x47504B47;
@@ -40,9 +42,9 @@ inline constexpr std::array<Layer, 4> kLayers{{
     {"loop_closures", "fid", "LINESTRING", "Keyframes between which a loop was closed"},
 }};
 /// The tables whose rows are a map's content, and which the history records.
-inline constexpr std::array<std::string_view, 7> kContentTables{
-    "understory_maps", "landmarks",        "trajectory",      "submap_borders",
-    "loop_closures",   "existence_states", "existence_models"};
+inline constexpr std::array<std::string_view, 8> kContentTables{
+    "understory_maps", "landmarks",        "trajectory",       "submap_borders",
+    "loop_closures",   "existence_states", "existence_models", "understory_reference"};
 
 /// One object of the schema: its name, and the SQL that makes it.
 struct SchemaObject {
@@ -52,6 +54,9 @@ struct SchemaObject {
 
 /// Everything that a file of a version has, in the order in which it is made.
 std::vector<SchemaObject> schema_objects(std::int64_t version = kSchemaVersion);
+
+/// Whether it is a trigger of a layer's index as the standard has it, and GDAL makes it anew.
+bool is_standard_trigger(std::string_view name, std::string_view sql);
 
 /// Makes everything in an empty database, in one transaction that the caller has begun.
 void create_schema(const Connection& connection);
@@ -65,7 +70,7 @@ std::int64_t schema_version(const Connection& connection);
 /// where it is one.
 void upgrade_schema(const Connection& connection);
 
-/// The rectangles and times of change that gpkg_contents states. `utime` [us].
+/// The rectangles, times of change and reference systems that gpkg_contents states. `utime` [us].
 void refresh_contents(const Connection& connection, model::Utime utime);
 
 }  // namespace understory::map_file

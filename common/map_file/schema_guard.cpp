@@ -113,8 +113,9 @@ bool may_have_attributes(std::string_view table) {
 
 bool is_as_ours(const Definition& own, const Definition& other) {
   if (own.type != other.type) return false;
-  return is_same_sql(own.sql, other.sql) || (own.type == "table" && may_have_attributes(own.name) &&
-                                             adds_plain_columns(own.sql, other.sql));
+  return is_same_sql(own.sql, other.sql) || is_standard_trigger(own.name, other.sql) ||
+         (own.type == "table" && may_have_attributes(own.name) &&
+          adds_plain_columns(own.sql, other.sql));
 }
 
 /// Definitions by their names and texts; the triggers that SQLite would run are found apart.

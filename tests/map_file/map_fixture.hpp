@@ -15,6 +15,7 @@
 
 #include "common/map_file/geometry_functions.hpp"
 #include "common/map_file/map_file.hpp"
+#include "common/map_file/schema.hpp"
 #include "tests/catch.hpp"
 #include "tests/io/log_fixture.hpp"
 
@@ -196,8 +197,9 @@ inline std::string dump_of(const std::filesystem::path& path,
 
 /// All that maps consist of.
 inline std::string dump_of_maps(const std::filesystem::path& path) {
-  return dump_of(path, {"understory_maps", "landmarks", "trajectory", "submap_borders",
-                        "loop_closures", "existence_states", "existence_models"});
+  return dump_of(path,
+                 {"understory_maps", "landmarks", "trajectory", "submap_borders", "loop_closures",
+                  "existence_states", "existence_models", "understory_reference"});
 }
 
 /// The same with the indexes.
@@ -207,17 +209,27 @@ inline std::string dump(const std::filesystem::path& path) {
                         "rtree_submap_borders_geom", "rtree_loop_closures_geom"});
 }
 
-/// Makes a file what a program of an earlier version would have written: its maps have no states.
+/// Makes a file what a program of an earlier version would have written: its maps have no states,
+/// and lie nowhere on the earth.
 inline void make_older(const std::filesystem::path& path, int version) {
-  RawFile(path).run(
-      "DROP TABLE existence_states; DROP TABLE existence_models; "
-      "DELETE FROM gpkg_extensions WHERE definition LIKE '%/111-%'");
+  const RawFile file(path);
+  for (const map_file::SchemaObject& one : map_file::schema_objects(version)) {
+    if (one.sql.starts_with("CREATE TRIGGER"))
+      file.run(fmt::format("DROP TRIGGER {}; {}", one.name, one.sql));
+  }
+  file.run(
+      "DROP TABLE understory_reference; DELETE FROM gpkg_extensions WHERE definition LIKE "
+      "'%/168-%'");
+  if (version < 3)
+    file.run(
+        "DROP TABLE existence_states; DROP TABLE existence_models; "
+        "DELETE FROM gpkg_extensions WHERE definition LIKE '%/111-%'");
   if (version < 2)
-    RawFile(path).run(
+    file.run(
         "DROP TABLE understory_submaps; DROP TABLE understory_submap_poses; "
         "DROP TABLE understory_closures; "
         "DELETE FROM gpkg_extensions WHERE definition LIKE '%/092-%'");
-  RawFile(path).run(
+  file.run(
       fmt::format("UPDATE understory_meta SET value = '{}' WHERE key = 'schema_version'", version));
 }
 

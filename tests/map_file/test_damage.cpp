@@ -75,6 +75,20 @@ TEST_CASE_METHOD(DamagedFile, "a file that was cut is noticed", "[map_file]") {
   }
 }
 
+TEST_CASE_METHOD(DamagedFile, "a last page that was cut is noticed when the file is opened",
+                 "[map_file]") {
+  std::mt19937_64 random(16);
+  constexpr std::size_t kPage = 4096;
+  for (int i = 0; i < 50; ++i) {
+    const std::size_t size = bytes.size() - 1 - random() % (kPage - 1);
+    CAPTURE(size);
+    write_bytes(file, Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)));
+    CHECK(fault_of_opening(file, Access::kRead) == Fault::kDamaged);
+    CHECK(fault_of_opening(file, Access::kWrite) == Fault::kDamaged);
+    CHECK(std::filesystem::file_size(file) == size);
+  }
+}
+
 TEST_CASE_METHOD(DamagedFile, "an index that lacks a feature is noticed", "[map_file]") {
   RawFile(file).run(
       "DELETE FROM rtree_trajectory_geom WHERE id = (SELECT min(fid) FROM trajectory)");

@@ -52,9 +52,9 @@ TEST_CASE_METHOD(Opened, "databases of others are refused and left alone", "[map
 }
 
 TEST_CASE_METHOD(Opened, "other versions of the schema are refused by number", "[map_file]") {
-  RawFile(file).run("UPDATE understory_meta SET value = '4'");
+  RawFile(file).run("UPDATE understory_meta SET value = '5'");
   check_refused(Fault::kOtherVersion);
-  CHECK_THROWS_WITH(MapFile(file, Access::kRead), Contains("'4'") && Contains("newer"));
+  CHECK_THROWS_WITH(MapFile(file, Access::kRead), Contains("'5'") && Contains("newer"));
   RawFile(file).run("UPDATE understory_meta SET value = '0'");
   check_refused(Fault::kOtherVersion);
   CHECK_THROWS_WITH(MapFile(file, Access::kRead), Contains("'0'") && !Contains("newer"));

@@ -113,7 +113,7 @@ TEST_CASE_METHOD(Faulty, "files that are something else, damaged, or of another 
   passed_over("file_foreign", true);
   RawFile(file).run("DROP TABLE understory_submaps");
   passed_over("file_damaged", true);
-  RawFile(file).run("UPDATE understory_meta SET value = '4' WHERE key = 'schema_version'");
+  RawFile(file).run("UPDATE understory_meta SET value = '9' WHERE key = 'schema_version'");
   passed_over("file_unusable", false);
 }
 
