@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -14,6 +13,7 @@
 
 #include "common/geometry/point_bins.hpp"
 #include "common/io/data_error.hpp"
+#include "common/io/text_table.hpp"
 
 namespace understory::io {
 namespace {
@@ -23,83 +23,46 @@ constexpr double kFarthestCoordinateM = 1e8;
 constexpr double kWidestSurveyM = 2e5;
 constexpr double kThickestTrunkM = 20.0;
 constexpr double kLargestSigmaM = 1e3;
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr double kThinnestTrunkM = 0.01;
+constexpr double kUsualTrunkM = 4.0;
 
 constexpr std::array<std::string_view, kLandmarkColumns> kLandmarkColumnNames{
     "x_m", "y_m", "sigma_m", "dbh_m", "kind"};
 
-/// Without the blanks and quotation marks around it.
-std::string_view bare_cell(std::string_view cell) {
-  const auto first = cell.find_first_not_of(" \t\r\"");
-  if (first == std::string_view::npos) return {};
-  return cell.substr(first, cell.find_last_not_of(" \t\r\"") - first + 1);
-}
-
-/// What separates the cells: the first of semicolon, tab and comma that the heading has.
-char delimiter_of(std::string_view heading) {
-  for (const char one : {';', '\t'}) {
-    if (heading.find(one) != std::string_view::npos) return one;
-  }
-  return ',';
-}
-
-/// A delimiter between quotation marks is none.
-std::vector<std::string_view> cells_of_line(std::string_view line, char delimiter) {
-  std::vector<std::string_view> cells;
-  std::size_t begin = 0;
-  bool is_quoted = false;
-  for (std::size_t i = 0; i <= line.size(); ++i) {
-    if (i < line.size() && line[i] == '"') is_quoted = !is_quoted;
-    if (i < line.size() && (is_quoted || line[i] != delimiter)) continue;
-    cells.push_back(bare_cell(line.substr(begin, i - begin)));
-    begin = i + 1;
-  }
-  return cells;
-}
-
-/// The table line by line.
+/// The landmarks of a table, row by row.
 class LandmarkTable {
  public:
-  LandmarkTable(std::string_view text, std::string_view source, const LandmarkTableOptions& options)
-      : source_(source), options_(options) {
-    if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
-      throw DataError(fmt::format("{}: UTF-16 text: save it as CSV in UTF-8", source_));
-    if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-    for (std::size_t begin = 0; begin < text.size();) {
-      const std::size_t end = std::min(text.find('\n', begin), text.size());
-      const std::string_view line = text.substr(begin, end - begin);
-      begin = end + 1;
-      ++line_;
-      if (bare_cell(line).empty() || bare_cell(line).front() == '#') continue;
-      headings_ ? take_row(cells_of_line(line, delimiter_)) : take_heading(line);
-    }
-
-    if (!headings_)
-      throw DataError(fmt::format("{}: no heading (x_m,y_m[,sigma_m][,dbh_m][,kind])", source_));
-    if (rows_.empty()) throw DataError(fmt::format("{}: no landmark in it", source_));
+  LandmarkTable(const TextTable& table, const LandmarkTableOptions& options)
+      : table_(table), options_(options) {
+    if (table.heading.cells.empty())
+      throw DataError(
+          fmt::format("{}: no heading (x_m,y_m[,sigma_m][,dbh_m][,kind])", table.source));
+    take_heading();
+    for (const TextRow& row : table.rows) take_row(row);
+    if (rows_.empty()) throw DataError(fmt::format("{}: no landmark in it", table.source));
   }
 
-  LandmarkRows take() { return {std::move(rows_), std::move(headings_->passed_over)}; }
+  LandmarkRows take() {
+    return {std::move(rows_), std::move(headings_.passed_over), std::move(remarks_)};
+  }
 
  private:
   [[noreturn]] void refuse(const std::string& why) const {
-    throw DataError(fmt::format("{}, line {}: {}", source_, line_, why));
+    throw DataError(fmt::format("{}, line {}: {}", table_.source, line_, why));
   }
 
-  void take_heading(std::string_view line) {
-    delimiter_ = delimiter_of(line);
-    const std::vector<std::string_view> cells = cells_of_line(line, delimiter_);
+  void take_heading() {
+    line_ = table_.heading.line;
     try {
-      headings_ = recognise_headings(cells, options_.columns);
+      headings_ = recognise_headings(table_.heading.cells, options_.columns, options_.unit);
     } catch (const std::invalid_argument& error) {
       refuse(error.what());
     }
-    cells_ = cells.size();
   }
 
-  void take_row(const std::vector<std::string_view>& cells) {
-    if (cells.size() != cells_)
-      refuse(fmt::format("{} cells, the heading has {}", cells.size(), cells_));
+  void take_row(const TextRow& from) {
+    line_ = from.line;
+    const std::vector<std::string>& cells = from.cells;
     LandmarkRow row;
     row.line = line_;
     model::MapLandmark& landmark = row.landmark;
@@ -109,37 +72,49 @@ class LandmarkTable {
         within(cells, LandmarkColumn::kSigma, kLargestSigmaM).value_or(options_.sigma_m);
     if (sigma == 0.0) refuse("sigma_m is 0: every estimate has an error");
     landmark.covariance_m2 = sigma * sigma * Eigen::Matrix2d::Identity();
-    landmark.radius_m =
-        0.5 * within(cells, LandmarkColumn::kDiameter, kThickestTrunkM).value_or(0.0);
+    const double diameter_m =
+        within(cells, LandmarkColumn::kDiameter, kThickestTrunkM).value_or(0.0);
+    landmark.radius_m = 0.5 * diameter_m;
+    if (diameter_m > 0.0 && (diameter_m < kThinnestTrunkM || diameter_m > kUsualTrunkM))
+      remarks_.push_back(
+          fmt::format("line {}, column '{}': {} is {:.4g} m of diameter: is it the unit?", line_,
+                      heading_of(LandmarkColumn::kDiameter), cell(cells, LandmarkColumn::kDiameter),
+                      diameter_m));
     landmark.kind = kind(cells);
     rows_.push_back(row);
   }
 
-  std::string_view cell(const std::vector<std::string_view>& cells, LandmarkColumn column) const {
-    const auto& found = headings_->at(column);
-    return found ? cells[found->place] : std::string_view();
+  std::string_view cell(const std::vector<std::string>& cells, LandmarkColumn column) const {
+    const auto& found = headings_.at(column);
+    return found ? std::string_view(cells[found->place]) : std::string_view();
   }
 
-  static std::string_view name_of(LandmarkColumn column) {
+  std::string_view heading_of(LandmarkColumn column) const {
+    return table_.heading.cells[headings_.at(column)->place];
+  }
+
+  std::string_view name_of(LandmarkColumn column) const {
+    if (options_.unit.is_degrees && column == LandmarkColumn::kX) return "longitude";
+    if (options_.unit.is_degrees && column == LandmarkColumn::kY) return "latitude";
     return kLandmarkColumnNames[static_cast<std::size_t>(column)];
   }
 
-  /// In metres. A comma is a decimal point where it does not separate cells.
+  /// In metres, or in degrees.
   double number(std::string_view text, LandmarkColumn column) const {
-    std::string with_point(text);
-    if (delimiter_ != ',' && text.find('.') == std::string_view::npos)
-      std::ranges::replace(with_point, ',', '.');
-    double value = 0.0;
-    const char* const end = with_point.data() + with_point.size();
-    const auto result = std::from_chars(with_point.data(), end, value);
-    if (text.empty() || result.ec != std::errc{} || result.ptr != end || !std::isfinite(value))
-      refuse(fmt::format("{} '{}' is no finite number", name_of(column), text.substr(0, 40)));
-    const double unit_m = headings_->at(column)->unit_m;
+    const double value = number_in(table_, line_, name_of(column), text);
+    const double unit_m = headings_.at(column)->unit_m;
     return unit_m == 1.0 ? value : unit_m * value;
   }
 
-  double coordinate(const std::vector<std::string_view>& cells, LandmarkColumn column) const {
+  double coordinate(const std::vector<std::string>& cells, LandmarkColumn column) const {
     const double value = number(cell(cells, column), column);
+    if (options_.unit.is_degrees) {
+      const double most = column == LandmarkColumn::kX ? 360.0 : 90.0;
+      if (std::abs(value) > most)
+        refuse(fmt::format("{} {} is not within -{} and {} degrees", name_of(column), value, most,
+                           most));
+      return value;
+    }
     if (std::abs(value) > kFarthestCoordinateM)
       refuse(fmt::format("{} {} is farther than 1e8 m from the origin", name_of(column), value));
     const bool is_far =
@@ -153,7 +128,7 @@ class LandmarkTable {
   }
 
   /// None where the cell is empty.
-  std::optional<double> within(const std::vector<std::string_view>& cells, LandmarkColumn column,
+  std::optional<double> within(const std::vector<std::string>& cells, LandmarkColumn column,
                                double most) const {
     const std::string_view text = cell(cells, column);
     if (text.empty()) return std::nullopt;
@@ -163,27 +138,27 @@ class LandmarkTable {
     return value;
   }
 
-  model::LandmarkKind kind(const std::vector<std::string_view>& cells) const {
+  model::LandmarkKind kind(const std::vector<std::string>& cells) const {
     const std::string_view text = cell(cells, LandmarkColumn::kKind);
     if (text.empty() || text == "trunk") return model::LandmarkKind::kTrunk;
     if (text == "corner") return model::LandmarkKind::kCorner;
     refuse(fmt::format("kind '{}' is neither trunk nor corner", text.substr(0, 40)));
   }
 
-  std::string source_;
-  LandmarkTableOptions options_;
-  std::optional<TableHeadings> headings_;
+  const TextTable& table_;
+  const LandmarkTableOptions& options_;
+  TableHeadings headings_;
   std::vector<LandmarkRow> rows_;
+  std::vector<std::string> remarks_;
   std::uint64_t line_ = 0;
-  std::size_t cells_ = 0;
-  char delimiter_ = ',';
 };
 
 }  // namespace
 
 LandmarkRows parse_landmark_table(std::string_view text, std::string_view source,
                                   const LandmarkTableOptions& options) {
-  return LandmarkTable(text, source, options).take();
+  const TextTable table = parse_text_table(text, source);
+  return LandmarkTable(table, options).take();
 }
 
 std::vector<ClosePair> close_pairs(const std::vector<LandmarkRow>& rows, double distance_m) {

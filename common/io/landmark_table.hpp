@@ -13,7 +13,7 @@ namespace understory::io {
 
 /// A landmark of a table.
 struct LandmarkRow {
-  model::MapLandmark landmark;  ///< Without id; frame of the survey.
+  model::MapLandmark landmark;  ///< Without id; frame of the survey, in metres or in degrees.
   std::uint64_t line = 0;       ///< Where it stands, from 1.
 };
 
@@ -28,20 +28,22 @@ struct ClosePair {
 struct LandmarkTableOptions {
   double sigma_m = 0.1;              ///< Of a row without one, in x and in y [m].
   std::vector<NamedColumn> columns;  ///< Columns that a person named.
+  CoordinateUnit
+      unit{};  ///< Of coordinates. Degrees are kept in `position_m`: longitude, latitude.
 };
 
 /// What a table has.
 struct LandmarkRows {
   std::vector<LandmarkRow> rows;
   std::vector<std::string> passed_over;  ///< Headings of columns that were not read.
+  std::vector<std::string> remarks;      ///< Diameters below 1 cm or above 4 m, a line each.
 };
 
 /// Rows of the columns x_m, y_m and, where they are there, sigma_m (standard deviation in x and in
 /// y, without correlation), dbh_m (diameter at breast height) and kind (trunk or corner), in any
 /// order and under the headings and units of table_headings.hpp; other columns are passed over and
-/// told. Cells are separated by semicolons, tabs or commas; a decimal comma is read where it does
-/// not separate. An empty cell is `sigma_m`, no diameter, a trunk. Empty lines and lines that start
-/// with # are passed over. Throws DataError with `source` and line for headings that are not
+/// told. The text is a table of text_table.hpp. An empty cell is `sigma_m`, no diameter, a trunk.
+/// Throws DataError with `source` and line for headings that are not
 /// recognised, a row of another number of cells, what is no finite number, coordinates beyond 1e8 m
 /// or farther than 200 km from the first row's, a sigma that is not within 0 (exclusive) and 1 km,
 /// a diameter that is not within 0 and 20 m, an unknown kind, and where there is no row.

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -12,28 +14,42 @@
 namespace understory::io {
 namespace {
 
+/// Which tables have a heading.
+enum class Coordinates : std::uint8_t { kAny, kMetres, kDegrees };
+
 struct KnownHeading {
   std::string_view name;
   LandmarkColumn column;
+  Coordinates of = Coordinates::kAny;
+  double factor = 1.0;  ///< By which its numbers become those of the column.
 };
 
 constexpr auto kX = LandmarkColumn::kX;
 constexpr auto kY = LandmarkColumn::kY;
 constexpr auto kDiameter = LandmarkColumn::kDiameter;
-constexpr std::array kKnownHeadings{KnownHeading{"x", kX},
-                                    KnownHeading{"east", kX},
-                                    KnownHeading{"easting", kX},
-                                    KnownHeading{"utmeast", kX},
-                                    KnownHeading{"rechtswert", kX},
-                                    KnownHeading{"y", kY},
-                                    KnownHeading{"north", kY},
-                                    KnownHeading{"northing", kY},
-                                    KnownHeading{"utmnorth", kY},
-                                    KnownHeading{"hochwert", kY},
+constexpr auto kInMetres = Coordinates::kMetres;
+constexpr auto kInDegrees = Coordinates::kDegrees;
+constexpr std::array kKnownHeadings{KnownHeading{"x", kX, kInMetres},
+                                    KnownHeading{"east", kX, kInMetres},
+                                    KnownHeading{"easting", kX, kInMetres},
+                                    KnownHeading{"utmeast", kX, kInMetres},
+                                    KnownHeading{"rechtswert", kX, kInMetres},
+                                    KnownHeading{"longitude", kX, kInDegrees},
+                                    KnownHeading{"lon", kX, kInDegrees},
+                                    KnownHeading{"lng", kX, kInDegrees},
+                                    KnownHeading{"long", kX, kInDegrees},
+                                    KnownHeading{"y", kY, kInMetres},
+                                    KnownHeading{"north", kY, kInMetres},
+                                    KnownHeading{"northing", kY, kInMetres},
+                                    KnownHeading{"utmnorth", kY, kInMetres},
+                                    KnownHeading{"hochwert", kY, kInMetres},
+                                    KnownHeading{"latitude", kY, kInDegrees},
+                                    KnownHeading{"lat", kY, kInDegrees},
                                     KnownHeading{"sigma", LandmarkColumn::kSigma},
                                     KnownHeading{"dbh", kDiameter},
                                     KnownHeading{"bhd", kDiameter},
                                     KnownHeading{"diameter", kDiameter},
+                                    KnownHeading{"radius", kDiameter, Coordinates::kAny, 2.0},
                                     KnownHeading{"kind", LandmarkColumn::kKind}};
 
 /// What --columns calls them.
@@ -42,15 +58,14 @@ constexpr std::array<std::string_view, kLandmarkColumns> kRoleNames{"x", "y", "s
 /// Letters by which a heading may differ from a known one to be meant for it.
 constexpr std::size_t kNear = 3;
 
-/// Headings of degrees.
-constexpr std::array<std::string_view, 6> kDegrees{"lat", "latitude", "lon",
-                                                   "lng", "long",     "longitude"};
-
 struct Unit {
   std::string_view name;
   double metres;
 };
 constexpr std::array kUnits{Unit{"m", 1.0}, Unit{"cm", 0.01}, Unit{"mm", 0.001}};
+
+constexpr std::array<std::string_view, 3> kFeet{"ft", "usft", "ftus"};
+constexpr std::array<std::string_view, 2> kDegreeUnits{"deg", "degrees"};
 
 /// A heading without what differs from table to table, and its unit.
 struct PlainHeading {
@@ -73,7 +88,9 @@ PlainHeading plain(std::string_view heading) {
   if (words.back().empty() && words.size() > 1) words.pop_back();
 
   PlainHeading result;
-  const bool is_unit = std::ranges::find(kUnits, words.back(), &Unit::name) != kUnits.end();
+  const bool is_unit = std::ranges::find(kUnits, words.back(), &Unit::name) != kUnits.end() ||
+                       std::ranges::find(kFeet, words.back()) != kFeet.end() ||
+                       std::ranges::find(kDegreeUnits, words.back()) != kDegreeUnits.end();
   if (words.size() > 1 && (is_unit || has_brackets)) {
     result.unit = words.back();
     words.pop_back();
@@ -82,26 +99,54 @@ PlainHeading plain(std::string_view heading) {
   return result;
 }
 
-std::optional<LandmarkColumn> column_of(std::string_view name) {
+const KnownHeading* known_heading(std::string_view name) {
   const auto* const known = std::ranges::find(kKnownHeadings, name, &KnownHeading::name);
-  return known == kKnownHeadings.end() ? std::nullopt : std::optional(known->column);
+  return known == kKnownHeadings.end() ? nullptr : known;
+}
+
+bool is_of(const KnownHeading& known, const CoordinateUnit& unit) {
+  return known.of == Coordinates::kAny || (known.of == kInDegrees) == unit.is_degrees;
 }
 
 bool is_coordinate(LandmarkColumn column) { return column == kX || column == kY; }
 
-double unit_m(const PlainHeading& heading, std::string_view written, LandmarkColumn column) {
+/// Feet are those of the reference system: there are several.
+std::optional<double> coordinate_unit(std::string_view written, const CoordinateUnit& unit) {
+  constexpr double kFoot_m = 0.3048;
+  if (written.empty()) return unit.is_degrees ? 1.0 : unit.metres;
+  if (unit.is_degrees)
+    return std::ranges::find(kDegreeUnits, written) != kDegreeUnits.end() ? std::optional(1.0)
+                                                                          : std::nullopt;
+  const bool is_in_feet = std::abs(unit.metres - kFoot_m) < 1e-5;
+  if (is_in_feet && std::ranges::find(kFeet, written) != kFeet.end()) return unit.metres;
+  const auto* const found = std::ranges::find(kUnits, written, &Unit::name);
+  return found == kUnits.end() ? std::nullopt : std::optional(found->metres);
+}
+
+[[noreturn]] void refuse_unit(std::string_view written, std::string_view unit,
+                              std::string_view known) {
+  throw std::invalid_argument(
+      fmt::format("column '{}': the unit '{}' is none of {}", written, unit, known));
+}
+
+double unit_m(const PlainHeading& heading, std::string_view written, LandmarkColumn column,
+              const CoordinateUnit& unit) {
   if (column == LandmarkColumn::kKind) return 1.0;
-  if (heading.unit.empty()) {
-    if (is_coordinate(column)) return 1.0;
+  if (is_coordinate(column)) {
+    const auto found = coordinate_unit(heading.unit, unit);
+    if (!found)
+      refuse_unit(written, heading.unit,
+                  unit.is_degrees ? "deg (the reference system has degrees)" : "m, cm, mm");
+    return *found;
+  }
+
+  if (heading.unit.empty())
     throw std::invalid_argument(
         fmt::format("column '{}' has no unit: is it in m, cm or mm? (--columns {}_cm={})", written,
-                    column == kDiameter ? "dbh" : "sigma", written));
-  }
-  const auto* const unit = std::ranges::find(kUnits, heading.unit, &Unit::name);
-  if (unit == kUnits.end())
-    throw std::invalid_argument(
-        fmt::format("column '{}': the unit '{}' is none of m, cm, mm", written, heading.unit));
-  return unit->metres;
+                    column == kDiameter ? heading.name : "sigma", written));
+  const auto* const found = std::ranges::find(kUnits, heading.unit, &Unit::name);
+  if (found == kUnits.end()) refuse_unit(written, heading.unit, "m, cm, mm");
+  return found->metres;
 }
 
 /// Letters that must be changed, added or left out to make one of the other (Levenshtein).
@@ -118,13 +163,14 @@ std::size_t distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-std::string missing_text(LandmarkColumn column, const std::vector<std::string>& passed_over) {
+std::string missing_text(LandmarkColumn column, const std::vector<std::string>& passed_over,
+                         const CoordinateUnit& unit) {
   const char* const role = column == kX ? "x" : "y";
   std::vector<std::string_view> known;
   std::string_view nearest;
   std::size_t least = std::numeric_limits<std::size_t>::max();
   for (const KnownHeading& one : kKnownHeadings) {
-    if (one.column != column) continue;
+    if (one.column != column || !is_of(one, unit)) continue;
     known.push_back(one.name);
     for (const std::string& heading : passed_over) {
       const std::size_t here = distance(plain(heading).name, one.name);
@@ -151,14 +197,19 @@ void take(TableHeadings& result, LandmarkColumn column, const FoundColumn& found
   place = found;
 }
 
-void take_named(TableHeadings& result, std::span<const std::string_view> headings,
-                const NamedColumn& one) {
+void take_named(TableHeadings& result, std::span<const std::string> headings,
+                const NamedColumn& one, const CoordinateUnit& coordinates) {
   const auto at = std::ranges::find(headings, one.heading);
   if (at == headings.end())
     throw std::invalid_argument(fmt::format("no column '{}' (--columns); there are {}", one.heading,
                                             fmt::join(headings, ", ")));
   const PlainHeading role = plain(one.role);
-  const LandmarkColumn column = *column_of(role.name);
+  const KnownHeading& known = *known_heading(role.name);
+  const bool is_x_or_y = role.name == "x" || role.name == "y";
+  if (!is_of(known, coordinates) && !is_x_or_y)
+    throw std::invalid_argument(fmt::format("--columns {}={}: the reference system has {}",
+                                            one.role, one.heading,
+                                            coordinates.is_degrees ? "degrees" : "no degrees"));
   const std::string unit = plain(one.heading).unit;
   if (!role.unit.empty() && !unit.empty() && unit != role.unit)
     throw std::invalid_argument(
@@ -169,7 +220,27 @@ void take_named(TableHeadings& result, std::span<const std::string_view> heading
     throw std::invalid_argument(fmt::format("--columns: '{}' is named twice", one.heading));
 
   const PlainHeading with_unit{role.name, role.unit.empty() ? unit : role.unit};
-  take(result, column, {place, unit_m(with_unit, one.heading, column)}, one.role);
+  take(result, known.column,
+       {place, known.factor * unit_m(with_unit, one.heading, known.column, coordinates)}, one.role);
+}
+
+/// Headings of the other kind of coordinates say which system is missing.
+void refuse_missing(LandmarkColumn column, const std::vector<std::string>& passed_over,
+                    const CoordinateUnit& unit) {
+  for (const std::string& heading : passed_over) {
+    const KnownHeading* const known = known_heading(plain(heading).name);
+    if (known == nullptr || known->column != column || is_of(*known, unit)) continue;
+    if (known->of == kInDegrees)
+      throw std::invalid_argument(fmt::format(
+          "column '{}' is in degrees: --crs EPSG:4326 (WGS 84, or the code of its own datum) "
+          "converts it to metres",
+          heading));
+    throw std::invalid_argument(fmt::format(
+        "column '{}': the reference system has degrees (columns lat and lon, or --columns "
+        "lat=HEADING,lon=HEADING)",
+        heading));
+  }
+  throw std::invalid_argument(missing_text(column, passed_over, unit));
 }
 
 }  // namespace
@@ -184,41 +255,36 @@ std::vector<NamedColumn> parse_named_columns(std::string_view text) {
     if (sign == std::string_view::npos || sign == 0 || sign + 1 == one.size())
       throw std::invalid_argument(fmt::format("'{}' is not of the form x=HEADING", one));
     const std::string role(one.substr(0, sign));
-    if (!column_of(plain(role).name))
-      throw std::invalid_argument(
-          fmt::format("'{}' is none of x, y, sigma_m, dbh_m (or _cm, _mm), kind", role));
+    if (known_heading(plain(role).name) == nullptr)
+      throw std::invalid_argument(fmt::format(
+          "'{}' is none of x, y, lat, lon, sigma_m, dbh_m (or _cm, _mm), radius_m, kind", role));
     named.push_back({role, std::string(one.substr(sign + 1))});
   }
   return named;
 }
 
-TableHeadings recognise_headings(std::span<const std::string_view> headings,
-                                 std::span<const NamedColumn> named) {
+TableHeadings recognise_headings(std::span<const std::string> headings,
+                                 std::span<const NamedColumn> named, const CoordinateUnit& unit) {
   TableHeadings result;
-  for (const NamedColumn& one : named) take_named(result, headings, one);
+  for (const NamedColumn& one : named) take_named(result, headings, one, unit);
   const std::array by_person = result.columns;
 
   for (std::size_t i = 0; i < headings.size(); ++i) {
     const auto is_named = [&](const auto& found) { return found && found->place == i; };
     if (std::ranges::any_of(by_person, is_named)) continue;
     const PlainHeading heading = plain(headings[i]);
-    const auto column = column_of(heading.name);
-    if (!column || by_person[static_cast<std::size_t>(*column)]) {
+    const KnownHeading* const known = known_heading(heading.name);
+    if (known == nullptr || !is_of(*known, unit) ||
+        by_person[static_cast<std::size_t>(known->column)]) {
       result.passed_over.emplace_back(headings[i]);
       continue;
     }
-    take(result, *column, {i, unit_m(heading, headings[i], *column)}, headings[i]);
+    take(result, known->column,
+         {i, known->factor * unit_m(heading, headings[i], known->column, unit)}, headings[i]);
   }
 
-  for (const LandmarkColumn column : {kX, kY}) {
-    if (result.at(column)) continue;
-    for (const std::string& heading : result.passed_over) {
-      if (std::ranges::find(kDegrees, plain(heading).name) != kDegrees.end())
-        throw std::invalid_argument(fmt::format(
-            "column '{}' is in degrees: convert it to metres (UTM, say) first", heading));
-    }
-    throw std::invalid_argument(missing_text(column, result.passed_over));
-  }
+  for (const LandmarkColumn column : {kX, kY})
+    if (!result.at(column)) refuse_missing(column, result.passed_over, unit);
   return result;
 }
 

@@ -22,6 +22,12 @@ struct NamedColumn {
   std::string heading;
 };
 
+/// What coordinates are in, where their headings have no unit.
+struct CoordinateUnit {
+  bool is_degrees = false;  ///< Of longitude and latitude.
+  double metres = 1.0;      ///< Of a projected system, e.g. 0.3048006 (US survey feet).
+};
+
 /// Where a column stands, and what its numbers are multiplied by to be metres.
 struct FoundColumn {
   std::size_t place = 0;
@@ -44,13 +50,15 @@ struct TableHeadings {
 std::vector<NamedColumn> parse_named_columns(std::string_view text);
 
 /// Recognises headings, whatever their case, blanks and underscores: x, east, easting, rechtswert;
-/// y, north, northing, hochwert; dbh, bhd, diameter; sigma; kind. A unit stands behind: x_m, "BHD
-/// [cm]", dbh_mm. Coordinates without one are in metres; a diameter or sigma without one is
-/// refused, since its unit is unknown. `named` columns count instead of what is recognised. Throws
+/// y, north, northing, hochwert; dbh, bhd, diameter; radius; sigma; kind; where coordinates are
+/// degrees, longitude, lon; latitude, lat. A unit stands behind: x_m, "BHD [cm]", dbh_mm.
+/// Coordinates without one are in `unit`; a diameter, radius or sigma without one is refused, since
+/// its unit is unknown. `named` columns count instead of what is recognised. Throws
 /// std::invalid_argument (a text for the heading's line) where x or y is missing, with the heading
 /// that is nearest; for a column that comes twice, a named one that is not there, an unknown unit,
-/// and for degrees. Cost O(headings times known ones).
-TableHeadings recognise_headings(std::span<const std::string_view> headings,
-                                 std::span<const NamedColumn> named);
+/// and degrees where metres are wanted. Cost O(headings times known ones).
+TableHeadings recognise_headings(std::span<const std::string> headings,
+                                 std::span<const NamedColumn> named,
+                                 const CoordinateUnit& unit = {});
 
 }  // namespace understory::io
