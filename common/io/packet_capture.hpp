@@ -13,18 +13,24 @@ namespace understory::io {
 
 /// The payload of one UDP packet.
 struct CapturedPacket {
-  model::Utime utime = 0;  ///< When it was captured [us since the epoch].
-  std::uint16_t port = 0;  ///< UDP, destination.
+  model::Utime utime = 0;         ///< When it was captured [us since the epoch]; of a packet in
+                                  ///< fragments, the one that completed it.
+  std::uint32_t sender = 0;       ///< IPv4, host's byte order.
+  std::uint16_t source_port = 0;  ///< UDP.
+  std::uint16_t port = 0;         ///< UDP, destination.
   std::vector<std::uint8_t> payload;
 };
 
 /// What was in the file so far.
 struct CaptureCounts {
   std::uint64_t frames = 0;
-  std::uint64_t not_udp = 0;  ///< Other protocols, fragments, cut off: passed over.
+  std::uint64_t not_udp = 0;     ///< Other protocols, cut off: passed over.
+  std::uint64_t fragments = 0;   ///< Of UDP packets that are larger than a frame.
+  std::uint64_t incomplete = 0;  ///< UDP packets of which fragments are missing: left out.
 };
 
-/// Ethernet (with VLAN tags) or raw IPv4 below; IPv4, UDP.
+/// Ethernet (with VLAN tags), Linux "cooked" (SLL, SLL2: `tcpdump -i any`), loopback or raw IPv4
+/// below; IPv4, whose fragments are joined; UDP. Times in microseconds or nanoseconds.
 class PacketCapture {
  public:
   /// Throws DataError.

@@ -16,6 +16,7 @@
 #include "deploy/cli/guarded_import.hpp"
 #include "deploy/cli/import_bag.hpp"
 #include "deploy/cli/import_pcd.hpp"
+#include "deploy/cli/import_packets.hpp"
 #include "deploy/cli/import_sensors.hpp"
 #include "deploy/cli/import_stem_frames.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
@@ -123,6 +124,7 @@ void add_import_command(CLI::App& parent) {
   add_bag_import(*command);
   add_sensor_imports(*command);
   add_pcd_import(*command);
+  add_packet_import(*command);
   add_stem_frames_import(*command);
 }
 

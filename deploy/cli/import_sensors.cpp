@@ -12,9 +12,6 @@
 
 #include "common/io/data_error.hpp"
 #include "common/io/kitti_raw.hpp"
-#include "common/io/packet_capture.hpp"
-#include "common/io/velodyne.hpp"
-#include "common/io/velodyne_fixes.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/failure.hpp"
@@ -32,8 +29,6 @@ struct SensorImportOptions {
   bool wheels = false;
   std::string poses = "icp";
   std::vector<double> laser;  ///< x_m, y_m, yaw_rad on the vehicle; empty = KITTI's.
-  std::string model = "vlp16";
-  std::string calibration;
   SensorTables tables;
 };
 
@@ -114,43 +109,6 @@ void import_kitti_reduced(const SensorImportOptions& options) {
   fmt::print("{} sweeps with poses ({}) -> {}\n", drive.sweeps(), options.poses, options.out);
 }
 
-io::VelodyneCalibration calibration_of(const SensorImportOptions& options) {
-  const auto model = io::velodyne_model(options.model);
-  if (!model) fail(fmt::format("--model {}: vlp16, vlp32c, hdl32e or hdl64e", options.model));
-  if (options.calibration.empty()) return velodyne_calibration(*model);
-  return io::parse_hdl64_calibration(read_recorded(options.calibration), options.calibration);
-}
-
-void import_pcap(const SensorImportOptions& options) {
-  io::PacketCapture capture(options.path);
-  io::VelodyneDecoder decoder(calibration_of(options));
-  RecordingLog log(options.out);
-  io::VelodyneFixes fixes;
-
-  while (const auto packet = capture.next()) {
-    terminal::throw_if_interrupted();
-    if (packet->port == io::kVelodynePositionPort) {
-      const auto position = io::parse_velodyne_position(packet->payload);
-      const auto fix = position ? fixes.add(*position, packet->utime) : std::nullopt;
-      if (fix) log.add("RAW_GNSS", *fix);
-    }
-    if (packet->port != io::kVelodyneDataPort) continue;
-    if (const auto sweep = decoder.add(packet->payload, packet->utime))
-      log.add_sweep("RAW_SWEEP", *sweep);
-  }
-
-  if (const auto sweep = decoder.finish()) log.add_sweep("RAW_SWEEP", *sweep);
-  const io::VelodyneCounts& counts = decoder.counts();
-  if (counts.turns == 0)
-    fail(fmt::format("{}: {} {} packets, {} refused: not one whole revolution", options.path,
-                     counts.packets, options.model, counts.refused));
-
-  log.commit();
-  fmt::print("{} revolutions of {} packets ({} refused, {} gaps), {} fixes{} -> {}\n", counts.turns,
-             counts.packets, counts.refused, counts.lost_azimuth, log.count("RAW_GNSS"),
-             capture.is_cut_off() ? ", the file is cut off" : "", options.out);
-}
-
 void import_csv(const SensorImportOptions& options) {
   if (options.tables.empty()) fail("import csv: none of --imu, --gnss, --wheels is given");
   RecordingLog log(options.out);
@@ -191,10 +149,6 @@ void add_sensor_imports(CLI::App& import) {
                    "that of 2011_09_26, as in deploy/config/kitti")
       ->delimiter(',')
       ->expected(3);
-  CLI::App* pcap = add_format(import, "pcap", "Captured packets of a Velodyne laser",
-                              "A pcap or pcapng file", options, import_pcap);
-  pcap->add_option("--model", options->model, "vlp16 (default), vlp32c, hdl32e or hdl64e");
-  pcap->add_option("--calibration", options->calibration, "The HDL-64E's own XML or YAML file");
   CLI::App* csv =
       add_format(import, "csv", "Tables of IMU, GNSS and wheels", "", options, import_csv);
   add_table_options(*csv, options->tables);

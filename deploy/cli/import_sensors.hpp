@@ -5,7 +5,7 @@
 
 namespace understory::cli {
 
-/// Adds kitti, kitti-reduced, pcap and csv.
+/// Adds kitti, kitti-reduced and csv.
 void add_sensor_imports(CLI::App& import);
 
 }  // namespace understory::cli

@@ -1,0 +1,253 @@
+#include "common/packets/ouster_metadata.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "common/io/data_error.hpp"
+
+namespace understory::packets {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kRadPerDegree = std::numbers::pi / 180.0;
+constexpr double kMetresPerMm = 1e-3;
+constexpr std::size_t kMostColumns = 4096;
+
+constexpr std::array<std::pair<std::string_view, OusterProfile>, 5> kProfiles{
+    {{"LEGACY", OusterProfile::kLegacy},
+     {"RNG19_RFL8_SIG16_NIR16", OusterProfile::kSingle},
+     {"RNG19_RFL8_SIG16_NIR16_DUAL", OusterProfile::kDual},
+     {"RNG15_RFL8_NIR8", OusterProfile::kLowDataRate},
+     {"FUSA_RNG15_RFL8_NIR8_DUAL", OusterProfile::kSafetyDual}}};
+
+constexpr std::array<std::pair<std::string_view, OusterTimeMode>, 3> kTimeModes{
+    {{"TIME_FROM_INTERNAL_OSC", OusterTimeMode::kInternal},
+     {"TIME_FROM_SYNC_PULSE_IN", OusterTimeMode::kSyncPulse},
+     {"TIME_FROM_PTP_1588", OusterTimeMode::kPtp}}};
+
+/// Where a field is: in a section of the nested layout, or at the top of the flat one.
+class Fields {
+ public:
+  Fields(std::string_view text, const std::string& source)
+      : root_(Json::parse(text, nullptr, false)), source_(source) {
+    if (root_.is_discarded() || !root_.is_object())
+      throw io::DataError(source_ + ": no JSON object: the metadata of an Ouster laser are wanted");
+  }
+
+  const Json* find(const char* section, const char* name) const {
+    // The flat layout has one section, of another name.
+    const bool is_format = section == std::string_view("lidar_data_format");
+    for (const char* in : {section, is_format ? "data_format" : section}) {
+      const auto found = root_.find(in);
+      if (found != root_.end() && found->is_object() && found->contains(name))
+        return &found->at(name);
+    }
+    return root_.contains(name) ? &root_.at(name) : nullptr;
+  }
+
+  std::string text(const char* section, const char* name) const {
+    const Json* field = find(section, name);
+    if (field == nullptr || field->is_null()) return {};
+    if (field->is_number_integer()) return std::to_string(field->get<std::int64_t>());
+    if (!field->is_string()) fail(name, "is no text");
+    return field->get<std::string>();
+  }
+
+  std::optional<double> number(const char* section, const char* name) const {
+    const Json* field = find(section, name);
+    if (field == nullptr || field->is_null()) return std::nullopt;
+    if (!field->is_number() || !std::isfinite(field->get<double>())) fail(name, "is no number");
+    return field->get<double>();
+  }
+
+  std::optional<std::vector<double>> numbers(const char* section, const char* name) const {
+    const Json* field = find(section, name);
+    if (field == nullptr || field->is_null()) return std::nullopt;
+    if (!field->is_array()) fail(name, "is no list of numbers");
+    std::vector<double> values;
+    for (const Json& value : *field) {
+      if (!value.is_number() || !std::isfinite(value.get<double>()))
+        fail(name, "is no list of numbers");
+      values.push_back(value.get<double>());
+    }
+    return values;
+  }
+
+  /// A whole number within [least, most].
+  std::size_t whole(const char* name, double value, std::size_t least, std::size_t most) const {
+    if (value != std::floor(value) || value < static_cast<double>(least) ||
+        value > static_cast<double>(most))
+      fail(name, fmt::format("is {}, not a whole number from {} to {}", value, least, most));
+    return static_cast<std::size_t>(value);
+  }
+
+  [[noreturn]] void fail(std::string_view name, std::string_view what) const {
+    throw io::DataError(fmt::format("{}: {} {}", source_, name, what));
+  }
+
+ private:
+  Json root_;
+  std::string source_;
+};
+
+/// 4 x 4, by rows, translations in millimetres.
+std::optional<Eigen::Isometry3d> transform(const Fields& fields, const char* section,
+                                           const char* name) {
+  const auto numbers = fields.numbers(section, name);
+  if (!numbers) return std::nullopt;
+  if (numbers->size() != 16) fields.fail(name, "has no 16 numbers");
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      result.linear()(row, column) = (*numbers)[static_cast<std::size_t>(4 * row + column)];
+    result.translation()[row] = kMetresPerMm * (*numbers)[static_cast<std::size_t>(4 * row + 3)];
+  }
+
+  constexpr double kOrthogonal = 1e-3;
+  const Eigen::Matrix3d m = result.linear();
+  if (!(m * m.transpose()).isIdentity(kOrthogonal) || m.determinant() < 0.0 ||
+      !(result.translation().norm() < 10.0))
+    fields.fail(name, "is no rotation and translation [mm]");
+  return result;
+}
+
+Eigen::Isometry3d shifted_mm(double x, double y, double z) {
+  return Eigen::Isometry3d(Eigen::Translation3d(kMetresPerMm * Eigen::Vector3d(x, y, z)));
+}
+
+/// Defaults of ouster-sdk, `metadata.cpp`: default_lidar_to_sensor, default_imu_to_sensor.
+Eigen::Isometry3d usual_sensor_T_lidar() {
+  Eigen::Isometry3d result = shifted_mm(0.0, 0.0, 36.18);
+  result.linear() = Eigen::Vector3d(-1.0, -1.0, 1.0).asDiagonal();
+  return result;
+}
+Eigen::Isometry3d usual_sensor_T_imu() { return shifted_mm(6.253, -11.775, 7.645); }
+
+/// Defaults of ouster-sdk, `types.cpp`: default_lidar_origin_to_beam_origin() [mm].
+double usual_beam_origin_mm(std::string_view product_line) {
+  if (product_line.starts_with("OS-0")) return 27.67;
+  if (product_line.starts_with("OS-1")) return 15.806;
+  if (product_line.starts_with("OS-2")) return 13.762;
+  return 12.163;
+}
+
+std::vector<double> beam_angles(const Fields& fields, const char* name) {
+  auto angles = fields.numbers("beam_intrinsics", name);
+  if (!angles || angles->empty()) fields.fail(name, "is missing");
+  constexpr std::array<std::size_t, 4> kBeams{16, 32, 64, 128};
+  if (std::ranges::find(kBeams, angles->size()) == kBeams.end())
+    fields.fail(name, fmt::format("has {} beams, not 16, 32, 64 or 128", angles->size()));
+  for (double& angle : *angles) {
+    if (std::abs(angle) > 90.0) fields.fail(name, "has an angle beyond 90 degrees");
+    angle *= kRadPerDegree;
+  }
+  return *std::move(angles);
+}
+
+/// From "1024x10".
+std::optional<double> columns_of_mode(const std::string& mode) {
+  std::size_t columns = 0;
+  const auto result = std::from_chars(mode.data(), mode.data() + mode.size(), columns);
+  if (result.ec != std::errc{} || result.ptr == mode.data() + mode.size() || *result.ptr != 'x')
+    return std::nullopt;
+  return static_cast<double>(columns);
+}
+
+template <class Value, std::size_t kSize>
+Value named(const Fields& fields, const char* what, const std::string& name,
+            const std::array<std::pair<std::string_view, Value>, kSize>& names) {
+  for (const auto& [known, value] : names) {
+    if (name == known) return value;
+  }
+  fields.fail(what, "\"" + name + "\" is not known");
+}
+
+void read_product(const Fields& fields, OusterMetadata& metadata) {
+  metadata.product_line = fields.text("sensor_info", "prod_line");
+  metadata.serial_number = fields.text("sensor_info", "prod_sn");
+  const std::string mode = fields.text("config_params", "timestamp_mode");
+  if (!mode.empty()) metadata.time_mode = named(fields, "timestamp_mode", mode, kTimeModes);
+  const auto multiplier = fields.number("config_params", "signal_multiplier");
+  metadata.signal_multiplier = multiplier.value_or(1.0);
+  const auto port = [&](const char* name) -> std::optional<int> {
+    const auto number = fields.number("config_params", name);
+    if (!number) return std::nullopt;
+    return static_cast<int>(fields.whole(name, *number, 0, 65535));
+  };
+  metadata.lidar_port = port("udp_port_lidar");
+  metadata.imu_port = port("udp_port_imu");
+}
+
+void read_format(const Fields& fields, OusterMetadata& metadata) {
+  std::string profile = fields.text("lidar_data_format", "udp_profile_lidar");
+  if (profile.empty()) profile = fields.text("config_params", "udp_profile_lidar");
+  if (!profile.empty()) metadata.profile = named(fields, "udp_profile_lidar", profile, kProfiles);
+
+  auto columns = fields.number("lidar_data_format", "columns_per_frame");
+  if (!columns) columns = columns_of_mode(fields.text("config_params", "lidar_mode"));
+  if (!columns) fields.fail("columns_per_frame", "is missing, and so is lidar_mode");
+  metadata.columns_per_frame = fields.whole("columns_per_frame", *columns, 16, kMostColumns);
+  metadata.last_column = metadata.columns_per_frame - 1;
+  if (const auto per_packet = fields.number("lidar_data_format", "columns_per_packet"))
+    metadata.columns_per_packet =
+        fields.whole("columns_per_packet", *per_packet, 1, metadata.columns_per_frame);
+
+  const auto window = fields.numbers("lidar_data_format", "column_window");
+  if (!window) return;
+  if (window->size() != 2) fields.fail("column_window", "has no 2 numbers");
+  metadata.first_column = fields.whole("column_window", window->front(), 0, metadata.last_column);
+  metadata.last_column = fields.whole("column_window", window->back(), 0, metadata.last_column);
+}
+
+void read_geometry(const Fields& fields, OusterMetadata& metadata) {
+  metadata.altitude_rad = beam_angles(fields, "beam_altitude_angles");
+  metadata.azimuth_rad = beam_angles(fields, "beam_azimuth_angles");
+  if (metadata.altitude_rad.size() != metadata.azimuth_rad.size())
+    fields.fail("beam_azimuth_angles", "has another length than beam_altitude_angles");
+  if (const auto pixels = fields.number("lidar_data_format", "pixels_per_column")) {
+    if (*pixels != static_cast<double>(metadata.beams()))
+      fields.fail("pixels_per_column",
+                  fmt::format("is {}, of {} beam angles", *pixels, metadata.beams()));
+  }
+
+  const auto origin_mm = fields.number("beam_intrinsics", "lidar_origin_to_beam_origin_mm");
+  if (origin_mm && std::abs(*origin_mm) > 1000.0)
+    fields.fail("lidar_origin_to_beam_origin_mm", "is more than a metre");
+  metadata.lidar_T_beam =
+      transform(fields, "beam_intrinsics", "beam_to_lidar_transform")
+          .value_or(shifted_mm(origin_mm.value_or(usual_beam_origin_mm(metadata.product_line)), 0.0,
+                               0.0));
+  metadata.sensor_T_lidar = transform(fields, "lidar_intrinsics", "lidar_to_sensor_transform")
+                                .value_or(usual_sensor_T_lidar());
+  metadata.sensor_T_imu =
+      transform(fields, "imu_intrinsics", "imu_to_sensor_transform").value_or(usual_sensor_T_imu());
+}
+
+}  // namespace
+
+std::string_view to_string(OusterProfile profile) {
+  return std::ranges::find(kProfiles, profile, [](const auto& p) { return p.second; })->first;
+}
+
+std::string_view to_string(OusterTimeMode mode) {
+  const auto found = std::ranges::find(kTimeModes, mode, [](const auto& m) { return m.second; });
+  return found == kTimeModes.end() ? "unknown" : found->first;
+}
+
+OusterMetadata parse_ouster_metadata(std::string_view text, const std::string& source) {
+  const Fields fields(text, source);
+  OusterMetadata metadata;
+  read_product(fields, metadata);
+  read_format(fields, metadata);
+  read_geometry(fields, metadata);
+  return metadata;
+}
+
+}  // namespace understory::packets

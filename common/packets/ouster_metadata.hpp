@@ -1,0 +1,63 @@
+// The metadata of an Ouster laser: what its packets do not say about themselves.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace understory::packets {
+
+/// Layouts of lidar packets (Ouster firmware manual, "Lidar Data Packet Format").
+enum class OusterProfile : std::uint8_t {
+  kLegacy,
+  kSingle,       ///< RNG19_RFL8_SIG16_NIR16
+  kDual,         ///< RNG19_RFL8_SIG16_NIR16_DUAL
+  kLowDataRate,  ///< RNG15_RFL8_NIR8
+  kSafetyDual,   ///< FUSA_RNG15_RFL8_NIR8_DUAL
+};
+/// As the metadata names it ("LEGACY", "RNG19_RFL8_SIG16_NIR16" and so on).
+std::string_view to_string(OusterProfile profile);
+
+/// Whose time the packets have: `timestamp_mode`.
+enum class OusterTimeMode : std::uint8_t {
+  kInternal,   ///< TIME_FROM_INTERNAL_OSC: counts from power-on.
+  kSyncPulse,  ///< TIME_FROM_SYNC_PULSE_IN: the time of day where the sensor gets NMEA, too.
+  kPtp,        ///< TIME_FROM_PTP_1588: the master's, usually TAI.
+  kUnknown,    ///< Older metadata do not say.
+};
+/// As the metadata names it; "unknown".
+std::string_view to_string(OusterTimeMode mode);
+
+/// What the decoder needs of the metadata. Translations are in metres (the file has millimetres).
+struct OusterMetadata {
+  std::string product_line;  ///< "OS-1-64"; empty = not told.
+  std::string serial_number;
+  OusterProfile profile = OusterProfile::kLegacy;
+  OusterTimeMode time_mode = OusterTimeMode::kUnknown;
+  std::size_t columns_per_frame = 1024;
+  std::size_t columns_per_packet = 16;
+  std::size_t first_column = 0;  ///< The azimuth window; it may go through column 0.
+  std::size_t last_column = 1023;
+  std::vector<double> altitude_rad;  ///< Of each beam, upwards.
+  std::vector<double> azimuth_rad;   ///< Of each beam, from the encoder's angle, clockwise.
+  Eigen::Isometry3d lidar_T_beam = Eigen::Isometry3d::Identity();  ///< At encoder angle 0.
+  Eigen::Isometry3d sensor_T_lidar = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d sensor_T_imu = Eigen::Isometry3d::Identity();
+  double signal_multiplier = 1.0;  ///< Above 1 with a narrower azimuth window; ranges stay.
+  std::optional<int> lidar_port;   ///< UDP, where the sensor sends to.
+  std::optional<int> imu_port;
+
+  std::size_t beams() const { return altitude_rad.size(); }  ///< 16, 32, 64 or 128.
+};
+
+/// Reads both layouts: the flat one of firmware before 2.4 and of older clients, and the nested one
+/// (`sensor_info`, `config_params`, `lidar_data_format`, `beam_intrinsics`, `lidar_intrinsics`,
+/// `imu_intrinsics`). What is missing has the makers' default (ouster-sdk, `metadata.cpp` and
+/// `types.cpp`), save for beam angles and the number of columns. Throws DataError, which names
+/// `source` and the field.
+OusterMetadata parse_ouster_metadata(std::string_view text, const std::string& source);
+
+}  // namespace understory::packets

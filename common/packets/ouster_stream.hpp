@@ -1,0 +1,84 @@
+// Packets of Ouster lasers: OS-0, OS-1, OS-2, OSDome.
+//
+// Layouts after the Ouster firmware user manual ("Lidar Data Packet Format", "IMU Data Packet
+// Format") and ouster-sdk (`ouster_client/src/parsing.cpp`, `xyzlut.cpp`). A lidar packet has
+// `columns_per_packet` columns; all beams of a column fire at its timestamp, and a column says
+// whether it is valid. Frames are told apart by their number, not by angles.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/packets/ouster_metadata.hpp"
+#include "common/packets/readings.hpp"
+#include "common/packets/sensor_clock.hpp"
+#include "common/packets/sweep_builder.hpp"
+
+namespace understory::packets {
+
+constexpr std::size_t kOusterImuBytes = 48;
+constexpr std::uint16_t kOusterLidarPort = 7502;
+constexpr std::uint16_t kOusterImuPort = 7503;
+
+/// Where the parts of a lidar packet lie [bytes].
+struct OusterFormat {
+  std::size_t packet_header = 0;
+  std::size_t column_header = 0;
+  std::size_t pixel = 0;  ///< One beam's data.
+  std::size_t column = 0;
+  std::size_t packet = 0;
+};
+/// Of the packets that a sensor with these metadata sends.
+OusterFormat ouster_format(OusterProfile profile, std::size_t beams,
+                           std::size_t columns_per_packet);
+
+/// Lidar and IMU packets in, frames and IMU samples out, in the sensor's frame (x away from the
+/// connector, z up). Dual returns give both points, unless they are the same.
+class OusterStream {
+ public:
+  /// Points at `max_range_m` and beyond are left out; 0 = the product line's range.
+  explicit OusterStream(OusterMetadata metadata, double max_range_m = 0.0);
+
+  /// What this packet brought: an IMU sample, or the frame that it ends.
+  Readings add(const Packet& packet);
+  /// The frame under way, where it goes to the end of the azimuth window.
+  std::optional<model::PointSweep> finish();
+
+  const StreamCounts& counts() const { return counts_; }        ///< Since the start.
+  const SensorClock& clock() const { return clock_; }           ///< The sensor's.
+  const OusterMetadata& metadata() const { return metadata_; }  ///< As given.
+  /// Of the IMU in the sensor's frame.
+  std::optional<Eigen::Vector3d> imu_position_m() const {
+    return metadata_.sensor_T_imu.translation();
+  }
+
+ private:
+  struct Column;
+  std::optional<Fault> check(std::span<const std::uint8_t> bytes) const;
+  Column column_at(std::span<const std::uint8_t> bytes, std::size_t number) const;
+  std::uint32_t frame_id(std::span<const std::uint8_t> bytes) const;
+  void add_lidar(const Packet& packet, Readings& readings);
+  void add_imu(const Packet& packet, Readings& readings);
+  void add_column(std::span<const std::uint8_t> bytes, const Column& column);
+  void take_time(std::int64_t time_ns, model::Utime received);
+  void end_frame(std::vector<model::PointSweep>& sweeps);
+  std::size_t from_window(std::size_t column) const;
+
+  OusterMetadata metadata_;
+  OusterFormat format_;
+  double max_range_m_;
+  SensorClock clock_;
+  SweepBuilder builder_;
+  StreamCounts counts_;
+  std::vector<std::uint16_t> rings_;         ///< Of each beam.
+  std::vector<std::size_t> order_;           ///< Beams in order of their rings.
+  std::vector<Eigen::Vector3d> directions_;  ///< Of each beam, encoder angle 0.
+  std::optional<std::uint32_t> frame_id_;
+  std::size_t next_column_ = 0;  ///< Expected, counted from the window's begin.
+  bool has_begin_ = false;       ///< The frame under way has its first columns.
+  std::uint64_t imu_samples_ = 0;
+};
+
+}  // namespace understory::packets
