@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <numeric>
 #include <utility>
@@ -17,6 +18,8 @@ using HesaiBytes = std::span<const std::uint8_t>;
 constexpr int kTurn = 36000;  // hundredths of a degree
 /// Of the azimuth from firing to firing; more is a gap. XT32 at 20 Hz, dual: 36 in 50 us.
 constexpr int kLargestStep = 600;
+/// A turn with a longer pause in it is of two.
+constexpr std::int64_t kLongestPause_ns = 50'000'000;
 constexpr double kRadPerHundredth = 2.0 * std::numbers::pi / kTurn;
 constexpr std::size_t kMostBlocks = 10;
 
@@ -104,6 +107,13 @@ void HesaiStream::end_turn(std::vector<model::PointSweep>& sweeps) {
   if (sweep && is_whole) sweeps.push_back(*std::move(sweep));
 }
 
+/// What was gathered is no part of the turn that comes.
+void HesaiStream::start_over() {
+  builder_.clear();
+  has_begin_ = false;
+  last_azimuth_ = -1;
+}
+
 Readings HesaiStream::add(const Packet& packet) {
   Readings readings;
   ++counts_.packets;
@@ -115,10 +125,12 @@ Readings HesaiStream::add(const Packet& packet) {
   }
   if (clock_.take(head.time_ns, packet.received) == SensorClock::Step::kJump) {
     ++counts_.jumps;
-    builder_.clear();
-    has_begin_ = false;
-    last_azimuth_ = -1;
+    start_over();
+  } else if (last_azimuth_ >= 0 && std::abs(head.time_ns - last_ns_) > kLongestPause_ns) {
+    ++counts_.gaps;
+    start_over();
   }
+  last_ns_ = head.time_ns;
 
   const std::size_t firings = format_.blocks / head.returns;
   for (std::size_t f = 0; f < firings; ++f) {

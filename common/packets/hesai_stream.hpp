@@ -39,6 +39,7 @@ class HesaiStream {
   struct Firing;
   std::optional<Fault> read_head(std::span<const std::uint8_t> bytes, Head& head) const;
   void add_firing(std::span<const std::uint8_t> bytes, const Head& head, const Firing& firing);
+  void start_over();
   void end_turn(std::vector<model::PointSweep>& sweeps);
 
   HesaiModel model_;
@@ -50,6 +51,7 @@ class HesaiStream {
   StreamCounts counts_;
   std::vector<std::uint16_t> rings_;  ///< Of each beam.
   std::vector<std::size_t> order_;    ///< Beams in order of their rings.
+  std::int64_t last_ns_ = 0;          ///< Of the last packet, sensor's clock.
   int last_azimuth_ = -1;             ///< Of the last firing [0.01 degrees].
   double azimuth_rate_ = 0.36;        ///< [0.01 degrees per us].
   bool has_begin_ = false;            ///< The turn under way began at azimuth 0.

@@ -33,8 +33,8 @@ void keep_states(SensorChain& chain, ChainRun& run) {
   run.states.resize(run.updates.size(), {run.keyframes, run.landmarks});
 }
 
-/// It reads the sensor itself, which only a process can.
-constexpr const char* kSensorDriver = "velodyne_driver";
+/// Drivers read the sensor itself, which only a process can.
+constexpr std::string_view kSensorDriver = "_driver";
 /// Keeps files; experiments read what is on the bus.
 constexpr std::string_view kStore = "submap_store";
 constexpr const char* kViewer = "viewer";  ///< Nobody looks.
@@ -144,7 +144,8 @@ std::vector<bus::Service> services_of(const std::filesystem::path& config_dir) {
   all.push_back(existence_tracker::existence_tracker_service());
   std::set<std::string> started;
   for (const bus::ProcessEntry& entry : bus::read_launch_config(config_dir).processes) {
-    if (entry.name == kSensorDriver || entry.name == kStore || entry.name == kViewer) continue;
+    if (entry.name.ends_with(kSensorDriver) || entry.name == kStore || entry.name == kViewer)
+      continue;
     if (std::ranges::find(all, entry.name, &bus::Service::name) == all.end()) {
       throw bus::ConfigurationError({(config_dir / "launch.toml").string() + ": process \"" +
                                      entry.name + "\" cannot be hosted here"});

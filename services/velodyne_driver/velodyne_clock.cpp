@@ -7,7 +7,6 @@ namespace understory::velodyne_driver {
 namespace {
 
 constexpr model::Utime kHour_us = 3'600'000'000;
-constexpr model::Utime kOffsetPeriod_us = 10'000'000;
 /// Sensor's and computer's clock may differ so much in what passed between two packets.
 constexpr model::Utime kLargestMismatch_us = 1'000'000;
 
@@ -28,16 +27,6 @@ void VelodyneClock::put_into_hour(std::uint32_t past_hour_us, model::Utime recei
   utime_ = static_cast<model::Utime>(hours) * kHour_us + past_hour_us;
 }
 
-void VelodyneClock::measure(model::Utime received) {
-  const model::Utime period = utime_ / kOffsetPeriod_us;
-  if (period != period_) {
-    offset_before_ = offset_;
-    offset_ = kNone;
-    period_ = period;
-  }
-  offset_ = std::min(offset_, received - utime_);
-}
-
 VelodyneClock::Reading VelodyneClock::take(std::uint32_t past_hour_us, model::Utime received) {
   Step step = Step::kNext;
   if (!has_started_) {
@@ -55,26 +44,20 @@ VelodyneClock::Reading VelodyneClock::take(std::uint32_t past_hour_us, model::Ut
       const model::Utime before = utime_;
       put_into_hour(past_hour_us, received);
       delta = utime_ - before;
-      forget_offset();
+      delay_.forget();
       if (std::abs(delta - passed) > kLargestMismatch_us && delta > kLargestGap_us)
         step = Step::kJump;
     }
 
     if (delta < 0) step = Step::kJump;
     if (step == Step::kNext && delta > kLargestGap_us) step = Step::kGap;
-    if (step == Step::kJump) forget_offset();
+    if (step == Step::kJump) delay_.forget();
   }
 
   past_hour_us_ = past_hour_us;
   received_ = received;
-  measure(received);
+  delay_.add(utime_, received);
   return {step, utime_};
-}
-
-std::optional<model::Utime> VelodyneClock::offset_us() const {
-  const model::Utime least = std::min(offset_, offset_before_);
-  if (least == kNone) return std::nullopt;
-  return least;
 }
 
 }  // namespace understory::velodyne_driver

@@ -1,12 +1,11 @@
 // The sensor's clock: from microseconds past the hour to stamps that advance.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <optional>
 
 #include "common/model/landmarks.hpp"
+#include "services/lidar_driver/least_delay.hpp"
 
 namespace understory::velodyne_driver {
 
@@ -30,24 +29,18 @@ class VelodyneClock {
   Reading take(std::uint32_t past_hour_us, model::Utime received);
   /// How far the computer's clock is ahead of the sensor's: the least (the least delayed packet) of
   /// the last ten to twenty seconds [us]; none before the first packet.
-  std::optional<model::Utime> offset_us() const;
+  std::optional<model::Utime> offset_us() const { return delay_.offset_us(); }
 
   static constexpr model::Utime kLargestGap_us = 50000;       ///< More is kGap.
   static constexpr model::Utime kLargestDisorder_us = 20000;  ///< Less, back in time, is kLate.
 
  private:
   void put_into_hour(std::uint32_t past_hour_us, model::Utime received);
-  void measure(model::Utime received);
-  void forget_offset() { offset_ = offset_before_ = kNone; }
-
-  static constexpr model::Utime kNone = std::numeric_limits<model::Utime>::max();
   bool has_started_ = false;
   model::Utime utime_ = 0;
   std::uint32_t past_hour_us_ = 0;
   model::Utime received_ = 0;
-  model::Utime offset_ = kNone;         ///< Least of this period.
-  model::Utime offset_before_ = kNone;  ///< Least of the one before.
-  model::Utime period_ = 0;
+  lidar_driver::LeastDelay delay_;
 };
 
 }  // namespace understory::velodyne_driver

@@ -30,7 +30,7 @@ VelodyneDriver::VelodyneDriver(const VelodyneDriverParameters& parameters,
                                io::VelodyneCalibration calibration)
     : parameters_(parameters),
       calibration_(std::move(calibration)),
-      decoder_(calibration_, parameters.sensor.max_range_m),
+      decoder_(calibration_, parameters.range.max_range_m),
       fixes_(plane_of(parameters.gnss)) {}
 
 bool VelodyneDriver::refuse(std::span<const std::uint8_t> packet, std::size_t size,
@@ -60,7 +60,7 @@ bool VelodyneDriver::refuse(std::span<const std::uint8_t> packet, std::size_t si
 void VelodyneDriver::start_over() {
   // Sweeps that were begun are numbered, too: no number must come twice.
   next_revolution_ += decoder_.counts().turns + 1;
-  decoder_ = io::VelodyneDecoder(calibration_, parameters_.sensor.max_range_m);
+  decoder_ = io::VelodyneDecoder(calibration_, parameters_.range.max_range_m);
   holes_reported_ = 0;
 }
 
@@ -73,11 +73,12 @@ std::optional<model::PointSweep> VelodyneDriver::stamped(std::optional<model::Po
   return sweep;
 }
 
-VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> packet,
-                                              std::size_t size, model::Utime received) {
-  VelodyneDriverOutput output;
+lidar_driver::DriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> packet,
+                                                    std::size_t size, model::Utime received) {
+  lidar_driver::DriverOutput output;
   ++counts_.data_packets;
-  if (refuse(packet, size, output.faults)) return output;
+  output.is_refused = refuse(packet, size, output.faults);
+  if (output.is_refused) return output;
 
   // Does its time follow?
   const VelodyneClock::Reading time = clock_.take(io::velodyne_packet_time_us(packet), received);
@@ -86,6 +87,7 @@ VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> pack
       break;
     case VelodyneClock::Step::kLate:
       ++counts_.late;
+      output.is_refused = true;
       output.faults.push_back(
           {wire::Reason::kLate, "a packet that is older than the one before it"});
       return output;
@@ -103,7 +105,8 @@ VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> pack
       break;
   }
 
-  output.sweep = stamped(decoder_.add(packet, time.utime));
+  if (auto sweep = stamped(decoder_.add(packet, time.utime)))
+    output.sweeps.push_back(*std::move(sweep));
   if (decoder_.counts().lost_azimuth > holes_reported_) {
     holes_reported_ = decoder_.counts().lost_azimuth;
     ++counts_.holes;
@@ -113,9 +116,9 @@ VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> pack
   return output;
 }
 
-VelodyneDriverOutput VelodyneDriver::add_position(std::span<const std::uint8_t> packet,
-                                                  std::size_t size, model::Utime received) {
-  VelodyneDriverOutput output;
+lidar_driver::DriverOutput VelodyneDriver::add_position(std::span<const std::uint8_t> packet,
+                                                        std::size_t size, model::Utime received) {
+  lidar_driver::DriverOutput output;
   ++counts_.position_packets;
   if (size != io::kVelodynePositionBytes || packet.size() != size) {
     ++counts_.bad_positions;
@@ -125,8 +128,8 @@ VelodyneDriverOutput VelodyneDriver::add_position(std::span<const std::uint8_t> 
 
   const auto position = io::parse_velodyne_position(packet);
   if (position) {
-    output.fix = fixes_.add(*position, received);
-    if (output.fix) ++counts_.fixes;
+    if (const auto fix = fixes_.add(*position, received)) output.fixes.push_back(*fix);
+    counts_.fixes += output.fixes.size();
   } else if (!is_empty_sentence(packet)) {
     ++counts_.bad_positions;
     output.faults.push_back(
@@ -137,16 +140,23 @@ VelodyneDriverOutput VelodyneDriver::add_position(std::span<const std::uint8_t> 
 
 std::optional<model::PointSweep> VelodyneDriver::finish() { return stamped(decoder_.finish()); }
 
+std::string VelodyneDriver::summary(const lidar_driver::SocketCounts& sockets) const {
+  const VelodyneDriverCounts& c = counts_;
+  return fmt::format(
+      "data packets {} (refused: size {}, model {}, damaged {}, late {}; other senders {}; thrown "
+      "away by the kernel {}), sweeps {} (with holes {}), gaps {}, clock jumps {}, position "
+      "packets {} (bad {}), fixes {}",
+      c.data_packets, c.wrong_size, c.wrong_model, c.damaged, c.late, sockets.other_senders,
+      sockets.overruns, c.sweeps, c.holes, c.gaps, c.jumps, c.position_packets, c.bad_positions,
+      c.fixes);
+}
+
 std::optional<wire::Refusal> VelodyneDriver::clock_fault() const {
   const auto offset = clock_.offset_us();
   if (!offset || parameters_.time.source != "sensor") return std::nullopt;
   const double offset_s = 1e-6 * static_cast<double>(*offset);
   if (std::abs(offset_s) <= parameters_.time.tolerance_s) return std::nullopt;
-  return wire::Refusal{
-      wire::Reason::kClockJump,
-      fmt::format("the sensor's clock is {:.3f} s behind the computer's: without PPS and "
-                  "NMEA set time.source = \"received\"",
-                  offset_s)};
+  return lidar_driver::clock_refusal(offset_s, "PPS and NMEA");
 }
 
 }  // namespace understory::velodyne_driver

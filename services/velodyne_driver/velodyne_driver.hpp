@@ -20,6 +20,7 @@
 #include "common/model/gnss.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/wire/result.hpp"
+#include "services/lidar_driver/driver_output.hpp"
 #include "services/velodyne_driver/parameters.hpp"
 #include "services/velodyne_driver/velodyne_clock.hpp"
 
@@ -44,13 +45,6 @@ struct VelodyneDriverCounts {
   std::uint64_t refused() const { return wrong_size + wrong_model + damaged + late; }
 };
 
-/// What one packet brought.
-struct VelodyneDriverOutput {
-  std::optional<model::PointSweep> sweep;  ///< A whole revolution, frame sensor, with point times.
-  std::optional<model::GnssFix> fix;
-  std::vector<wire::Refusal> faults;  ///< For HEALTH.
-};
-
 /// Decodes packets, assembles them to sweeps and stamps these. No state outlives a restart: a sweep
 /// that is in progress is lost, as on a real sensor that was off.
 class VelodyneDriver {
@@ -58,17 +52,24 @@ class VelodyneDriver {
   /// `calibration`: of the model in `parameters.sensor`.
   VelodyneDriver(const VelodyneDriverParameters& parameters, io::VelodyneCalibration calibration);
 
+  /// Takes a packet of the data port (0) or of the position port (1).
+  lidar_driver::DriverOutput add(std::size_t port, std::span<const std::uint8_t> packet,
+                                 std::size_t size, model::Utime received) {
+    return port == 0 ? add_data(packet, size, received) : add_position(packet, size, received);
+  }
   /// Takes a data packet. `size`: of the packet as sent, where `packet` holds only its begin.
   /// `received`: by the computer's clock [us].
-  VelodyneDriverOutput add_data(std::span<const std::uint8_t> packet, std::size_t size,
-                                model::Utime received);
+  lidar_driver::DriverOutput add_data(std::span<const std::uint8_t> packet, std::size_t size,
+                                      model::Utime received);
   /// Takes a position packet; parameters as above.
-  VelodyneDriverOutput add_position(std::span<const std::uint8_t> packet, std::size_t size,
-                                    model::Utime received);
+  lidar_driver::DriverOutput add_position(std::span<const std::uint8_t> packet, std::size_t size,
+                                          model::Utime received);
   /// The sweep in progress, where it is almost whole.
   std::optional<model::PointSweep> finish();
 
   const VelodyneDriverCounts& counts() const { return counts_; }  ///< Since the start.
+  /// The counts, for LOG.
+  std::string summary(const lidar_driver::SocketCounts& sockets) const;
   /// How far the computer's clock is ahead of the sensor's [us].
   std::optional<model::Utime> clock_offset_us() const { return clock_.offset_us(); }
   /// What is wrong with the sensor's clock now, if anything is.

@@ -11,7 +11,7 @@
 #include "tests/data.hpp"
 #include "tests/io/log_fixture.hpp"
 #include "tests/io/velodyne_packets.hpp"
-#include "tests/velodyne_driver/live_driver.hpp"
+#include "tests/velodyne_driver/live_velodyne.hpp"
 
 using namespace understory;
 using namespace understory::velodyne_driver;
@@ -88,7 +88,7 @@ TEST_CASE("live sweeps are those of the offline decoder, byte for byte", "[velod
     std::string toml = "[sensor]\nmodel = \"" + laser.model + "\"\n";
     if (laser.maker.hdl64)
       toml += "calibration_file = \"" + (directory / "db.yaml").string() + "\"\n";
-    test::LiveDriver driver(toml);
+    test::LiveVelodyne driver(toml);
     const auto packets = packets_of(laser.maker, 500);
     for (const test::Packet& packet : packets) driver.send(packet);
     driver.finish();
@@ -103,7 +103,7 @@ TEST_CASE("live sweeps are those of the offline decoder, byte for byte", "[velod
 TEST_CASE("a recorded capture, sent again, gives the sweeps and fixes of its import",
           "[velodyne_driver][recorded]") {
   const fs::path capture_file = test::recording("lidar_packets/velodyne_vlp16_gps.pcap");
-  test::LiveDriver driver;
+  test::LiveVelodyne driver;
   test::Sender positions;
   std::vector<test::Packet> data;
   std::vector<model::GnssFix> fixes;
@@ -136,7 +136,7 @@ TEST_CASE("a recorded capture, sent again, gives the sweeps and fixes of its imp
 
 TEST_CASE("garbage among the packets is counted and changes nothing", "[velodyne_driver]") {
   std::mt19937_64 random(5);
-  test::LiveDriver driver;
+  test::LiveVelodyne driver;
   const auto packets = packets_of({.azimuth = 35000}, 250);
   std::int64_t sent = 0;
   for (const test::Packet& packet : packets) {
@@ -161,7 +161,7 @@ TEST_CASE("garbage among the packets is counted and changes nothing", "[velodyne
 }
 
 TEST_CASE("position packets that are none are counted", "[velodyne_driver]") {
-  test::LiveDriver driver;
+  test::LiveVelodyne driver;
   test::Sender sender;
   test::Packet packet(io::kVelodynePositionBytes, 0);
   sender.send(driver.position_port, packet);  // no receiver at the sensor: nothing is wrong
@@ -178,7 +178,7 @@ TEST_CASE("position packets that are none are counted", "[velodyne_driver]") {
 }
 
 TEST_CASE("a silent sensor is told for as long as it lasts", "[velodyne_driver]") {
-  test::LiveDriver driver;
+  test::LiveVelodyne driver;
   const auto silences = [&] { return driver.count("RAW_SWEEP", wire::Reason::kSensorSilent); };
   driver.settle();
   driver.now_us += 990'000;
@@ -206,7 +206,7 @@ TEST_CASE("a silent sensor is told for as long as it lasts", "[velodyne_driver]"
 }
 
 TEST_CASE("packets of a second sensor are not mixed in", "[velodyne_driver]") {
-  test::LiveDriver driver;
+  test::LiveVelodyne driver;
   test::Sender other("127.0.0.2");
   test::PacketMaker strange{.azimuth = 12000, .distance = 900};
   const auto packets = packets_of({.azimuth = 35000}, 250);
@@ -221,7 +221,7 @@ TEST_CASE("packets of a second sensor are not mixed in", "[velodyne_driver]") {
 }
 
 TEST_CASE("packets that the kernel throws away are counted", "[velodyne_driver]") {
-  test::LiveDriver driver("receive_buffer_bytes = 8192\n");
+  test::LiveVelodyne driver("receive_buffer_bytes = 8192\n");
   test::Sender sensor;
   test::PacketMaker maker;
   for (int i = 0; i < 300; ++i) sensor.send(driver.data_port, maker.next());
@@ -240,7 +240,7 @@ TEST_CASE("packets that the kernel throws away are counted", "[velodyne_driver]"
 }
 
 TEST_CASE("a turn across a pause of the sensor is not published", "[velodyne_driver]") {
-  test::LiveDriver driver;
+  test::LiveVelodyne driver;
   test::PacketMaker maker{.azimuth = 35000};
   for (int i = 0; i < 120; ++i) driver.send(maker.next());
   maker.time_us += 700'000;
@@ -264,9 +264,9 @@ TEST_CASE("a sensor's clock that is not the computer's is told, or made up for",
   test::PacketMaker maker{.azimuth = 35000};
   maker.time_us = static_cast<double>((now() + 900'000'000) % 3'600'000'000);
   const auto packets = packets_of(maker, 150);
-  test::LiveDriver by_sensor;
-  test::LiveDriver by_arrival("[time]\nsource = \"received\"\n");
-  for (test::LiveDriver* driver : {&by_sensor, &by_arrival}) {
+  test::LiveVelodyne by_sensor;
+  test::LiveVelodyne by_arrival("[time]\nsource = \"received\"\n");
+  for (test::LiveVelodyne* driver : {&by_sensor, &by_arrival}) {
     for (const test::Packet& packet : packets) driver->send(packet);
     driver->settle();
     driver->now_us += 999'000;
@@ -275,7 +275,7 @@ TEST_CASE("a sensor's clock that is not the computer's is told, or made up for",
     driver->now_us += 2'000;
     driver->finish();
   }
-  const auto stamp = [](test::LiveDriver& driver) {
+  const auto stamp = [](test::LiveVelodyne& driver) {
     return sweep_of(driver.published["RAW_SWEEP"].at(0)).utime;
   };
   CHECK(by_sensor.count("RAW_SWEEP", wire::Reason::kClockJump) == 1);

@@ -7,10 +7,10 @@
 #include "common/bus/live_bus.hpp"
 #include "common/bus/parameter_table.hpp"
 #include "deploy/launch/child_process.hpp"
-#include "services/velodyne_driver/udp_socket.hpp"
+#include "services/lidar_driver/udp_socket.hpp"
 #include "tests/io/log_fixture.hpp"
 #include "tests/io/velodyne_packets.hpp"
-#include "tests/velodyne_driver/live_driver.hpp"
+#include "tests/velodyne_driver/live_velodyne.hpp"
 
 using namespace understory;
 using namespace understory::velodyne_driver;
@@ -85,11 +85,11 @@ TEST_CASE("configurations that cannot work are refused by key", "[velodyne_drive
 }
 
 TEST_CASE("a port that is taken is named", "[velodyne_driver]") {
-  const UdpSocket taken("127.0.0.1", 0, 65536);
+  const lidar_driver::UdpSocket taken("127.0.0.1", 0, 65536);
   const std::string port = std::to_string(taken.port());
   std::string problem;
   try {
-    const UdpSocket second("127.0.0.1", taken.port(), 65536);
+    const lidar_driver::UdpSocket second("127.0.0.1", taken.port(), 65536);
   } catch (const std::runtime_error& error) {
     problem = error.what();
   }

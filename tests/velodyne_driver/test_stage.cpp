@@ -29,7 +29,7 @@ std::vector<wire::Refusal> faults_of(VelodyneDriver& driver, test::PacketMaker& 
 
 TEST_CASE("a packet of another size is too short or too long", "[velodyne_driver]") {
   VelodyneDriver stage = driver();
-  const auto reason_of = [](const VelodyneDriverOutput& output) {
+  const auto reason_of = [](const lidar_driver::DriverOutput& output) {
     REQUIRE(output.faults.size() == 1);
     return output.faults[0].reason;
   };

@@ -1,41 +1,39 @@
-// The two ports that a Velodyne sends to, and sweeps on their way to the bus.
+// The ports that a laser sends to, and sweeps on their way to the bus.
 #pragma once
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "common/bus/node.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/wire/result.hpp"
-#include "services/velodyne_driver/parameters.hpp"
-#include "services/velodyne_driver/udp_socket.hpp"
+#include "services/lidar_driver/driver_output.hpp"
+#include "services/lidar_driver/parameters.hpp"
+#include "services/lidar_driver/udp_socket.hpp"
 
-namespace understory::velodyne_driver {
+namespace understory::lidar_driver {
 
-/// The sockets for data and position packets, and which of their faults have been reported.
+/// The sockets of a sensor's ports, and which of their faults have been reported.
 class PacketSockets {
  public:
   /// Throws std::runtime_error where a port is taken.
-  explicit PacketSockets(const VelodyneNetworkParameters& network)
-      : data_(network.bind_address, network.data_port, network.receive_buffer_bytes),
-        positions_(network.bind_address, network.position_port, network.receive_buffer_bytes) {}
+  PacketSockets(const NetworkParameters& network, const std::vector<PortSettings>& ports);
 
-  UdpSocket& data() { return data_; }            ///< Data packets: points.
-  UdpSocket& positions() { return positions_; }  ///< Position packets: GNSS.
+  std::size_t size() const { return sockets_.size(); }                 ///< Number of ports.
+  UdpSocket& operator[](std::size_t port) { return *sockets_[port]; }  ///< In the given order.
+  const UdpSocket& operator[](std::size_t port) const { return *sockets_[port]; }
   /// To be polled.
-  std::vector<int> file_descriptors() const {
-    return {data_.file_descriptor(), positions_.file_descriptor()};
-  }
+  std::vector<int> file_descriptors() const;
   /// Packets that the kernel threw away so far.
-  std::uint64_t overruns() const { return data_.overruns() + positions_.overruns(); }
+  std::uint64_t overruns() const;
   /// Overruns and network errors since the last call.
   std::vector<wire::Refusal> new_faults();
 
  private:
-  UdpSocket data_;
-  UdpSocket positions_;
+  std::vector<std::unique_ptr<UdpSocket>> sockets_;
   std::uint64_t overruns_reported_ = 0;
   std::uint64_t errors_reported_ = 0;
 };
@@ -61,4 +59,4 @@ class SweepOutbox {
   std::deque<model::PointSweep> parts_;
 };
 
-}  // namespace understory::velodyne_driver
+}  // namespace understory::lidar_driver

@@ -1,4 +1,4 @@
-#include "services/velodyne_driver/udp_socket.hpp"
+#include "services/lidar_driver/udp_socket.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -7,12 +7,13 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <stdexcept>
 
-namespace understory::velodyne_driver {
+namespace understory::lidar_driver {
 namespace {
 
 [[noreturn]] void fail(int file, const std::string& address, int port) {
@@ -38,11 +39,6 @@ std::optional<std::uint32_t> parse_ipv4(const std::string& text) {
   in_addr address{};
   if (::inet_pton(AF_INET, text.c_str(), &address) != 1) return std::nullopt;
   return ntohl(address.s_addr);
-}
-
-std::string ipv4_text(std::uint32_t address) {
-  return fmt::format("{}.{}.{}.{}", address >> 24U, address >> 16U & 255U, address >> 8U & 255U,
-                     address & 255U);
 }
 
 UdpSocket::UdpSocket(const std::string& address, int port, int receive_buffer_bytes) {
@@ -89,7 +85,8 @@ std::optional<Datagram> UdpSocket::receive() {
   }
   Datagram datagram;
   datagram.size = static_cast<std::size_t>(size);
-  datagram.bytes = std::span(buffer_).first(std::min(datagram.size, buffer_.size()));
+  datagram.bytes =
+      std::span<const std::uint8_t>(buffer_).first(std::min(datagram.size, buffer_.size()));
   datagram.sender = ntohl(sender.sin_addr.s_addr);
   for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET) continue;
@@ -108,4 +105,4 @@ std::optional<Datagram> UdpSocket::receive() {
   return datagram;
 }
 
-}  // namespace understory::velodyne_driver
+}  // namespace understory::lidar_driver

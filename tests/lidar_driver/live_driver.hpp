@@ -1,4 +1,4 @@
-// The driver as its process has it, with a socket on loopback, and a sensor that sends to it.
+// A driver as its process has it, with a socket on loopback, and a sensor that sends to it.
 #pragma once
 
 #include <arpa/inet.h>
@@ -17,7 +17,8 @@
 #include "common/bus/device.hpp"
 #include "common/bus/memory_bus.hpp"
 #include "common/bus/service.hpp"
-#include "services/velodyne_driver/adapter.hpp"
+#include "common/model/point_sweep.hpp"
+#include "common/wire/convert.hpp"
 #include "tests/catch.hpp"
 #include "understory/log_t.hpp"
 
@@ -58,22 +59,22 @@ class Sender {
 
 class LiveDriver {
  public:
-  explicit LiveDriver(const std::string& toml = "")
-      : hosted_(velodyne_driver::velodyne_driver_service(), bus_, clock(),
-                "[network]\nbind_address = \"127.0.0.1\"\n"
-                "data_port = 0\nposition_port = 0\n" +
-                    toml,
+  /// `toml`: its configuration but for bind_address.
+  LiveDriver(const bus::Service& service, const std::string& toml)
+      : hosted_(service, bus_, clock(), "[network]\nbind_address = \"127.0.0.1\"\n" + toml,
                 "test.toml"),
         device_(dynamic_cast<bus::Device&>(hosted_.adapter())) {
     device_.open();
     hosted_.node().connect();
     for (const log_t& line : log) {
-      if (line.code == "listens")
-        REQUIRE(std::sscanf(line.text.c_str(), "127.0.0.1: data port %d, position port %d",
-                            &data_port, &position_port) == 2);
+      if (line.code != "listens") continue;
+      constexpr std::string_view kPort = " port ";
+      for (auto at = line.text.find(kPort); at != std::string::npos;
+           at = line.text.find(kPort, at + 1))
+        ports.push_back(std::atoi(line.text.c_str() + at + kPort.size()));
     }
-    REQUIRE(data_port > 0);
-    REQUIRE(position_port > 0);
+    REQUIRE(!ports.empty());
+    for (const int port : ports) REQUIRE(port > 0);
   }
 
   /// Lets it work until nothing waits any more.
@@ -84,8 +85,8 @@ class LiveDriver {
       device_.attend(now_us);
     } while (device_.wait_ms() == 0 || ::poll(files.data(), files.size(), 20) > 0);
   }
-  void send(std::span<const std::uint8_t> packet) {
-    sensor_.send(data_port, packet);
+  void send(std::span<const std::uint8_t> packet, std::size_t port = 0) {
+    sensor_.send(ports[port], packet);
     if (++sent_ % 20 == 0) settle();
   }
   void finish() {
@@ -97,8 +98,7 @@ class LiveDriver {
   }
   std::int8_t state() { return hosted_.node().monitor().state(); }
 
-  int data_port = 0;
-  int position_port = 0;
+  std::vector<int> ports;               ///< In the order of its settings.
   std::int64_t now_us = 1'000'000'000;  ///< Monotonic.
   std::map<std::string, std::vector<Message>> published;
   std::vector<log_t> log;
@@ -122,29 +122,6 @@ class LiveDriver {
   bus::Device& device_;
   Sender sensor_;
   int sent_ = 0;
-};
-
-/// What the import of a capture would have written: decoder and parts, without driver.
-class OfflineDriver {
- public:
-  explicit OfflineDriver(io::VelodyneCalibration calibration) : decoder_(std::move(calibration)) {}
-
-  void add(std::span<const std::uint8_t> packet, model::Utime received) {
-    if (const auto turn = decoder_.add(packet, received)) write(*turn);
-  }
-  void finish() {
-    if (const auto turn = decoder_.finish()) write(*turn);
-  }
-  std::vector<Message> parts;
-
- private:
-  void write(const model::PointSweep& turn) {
-    for (model::PointSweep& part : split_sweep(turn, 4000)) {
-      part.sequence = parts.size();
-      parts.push_back(wire::encode_message(part));
-    }
-  }
-  io::VelodyneDecoder decoder_;
 };
 
 inline model::PointSweep sweep_of(const Message& message) {

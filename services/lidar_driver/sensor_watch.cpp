@@ -1,10 +1,10 @@
-#include "services/velodyne_driver/sensor_watch.hpp"
+#include "services/lidar_driver/sensor_watch.hpp"
 
 #include <utility>
 
-#include "services/velodyne_driver/udp_socket.hpp"
+#include "services/lidar_driver/udp_socket.hpp"
 
-namespace understory::velodyne_driver {
+namespace understory::lidar_driver {
 namespace {
 
 constexpr std::int64_t kSecond_us = 1'000'000;
@@ -45,4 +45,4 @@ SilenceWatch::Due SilenceWatch::look(std::int64_t now_us) {
   return is_silent_ ? Due::kReportSilence : Due::kCheckClock;
 }
 
-}  // namespace understory::velodyne_driver
+}  // namespace understory::lidar_driver

@@ -1,12 +1,11 @@
 // Whose packets are taken, and when silence is reported.
-#include "services/velodyne_driver/sensor_watch.hpp"
-#include "services/velodyne_driver/udp_socket.hpp"
+#include "services/lidar_driver/sensor_watch.hpp"
+#include "services/lidar_driver/udp_socket.hpp"
 #include "tests/catch.hpp"
 
-using namespace understory::velodyne_driver;
+using namespace understory::lidar_driver;
 
-TEST_CASE("the first sensor is kept until it is silent, a fixed one for ever",
-          "[velodyne_driver]") {
+TEST_CASE("the first sensor is kept until it is silent, a fixed one for ever", "[lidar_driver]") {
   const std::uint32_t one = *parse_ipv4("192.168.1.201");
   const std::uint32_t other = *parse_ipv4("192.168.1.202");
   for (const bool is_fixed : {false, true}) {
@@ -22,7 +21,7 @@ TEST_CASE("the first sensor is kept until it is silent, a fixed one for ever",
 }
 
 TEST_CASE("silence is reported at once, then every second, until a packet comes",
-          "[velodyne_driver]") {
+          "[lidar_driver]") {
   using Due = SilenceWatch::Due;
   SilenceWatch watch;
   watch.set_silence_s(0.3);

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace understory::velodyne_driver {
+namespace understory::lidar_driver {
 
 /// Lets the packets of one sensor through: those of two on one port would be mixed into one sweep.
 class SenderFilter {
@@ -64,4 +64,4 @@ class SilenceWatch {
   bool is_silent_ = false;
 };
 
-}  // namespace understory::velodyne_driver
+}  // namespace understory::lidar_driver

@@ -1,15 +1,15 @@
 // A UDP socket that only receives.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/model/landmarks.hpp"
 
-namespace understory::velodyne_driver {
+namespace understory::lidar_driver {
 
 /// One packet as it came.
 struct Datagram {
@@ -21,8 +21,6 @@ struct Datagram {
 
 /// "192.168.1.201", host's byte order; none where it is no IPv4 address.
 std::optional<std::uint32_t> parse_ipv4(const std::string& text);
-/// The inverse of parse_ipv4().
-std::string ipv4_text(std::uint32_t address);
 
 /// Owns a bound, non-blocking socket. The kernel stamps the packets and counts those it drops.
 class UdpSocket {
@@ -58,7 +56,8 @@ class UdpSocket {
   std::uint64_t overruns_ = 0;
   std::uint64_t errors_ = 0;
   std::string last_error_;
-  std::array<std::uint8_t, 2048> buffer_{};
+  /// As large as a UDP packet can be: an Ouster's have up to 33 kB.
+  std::vector<std::uint8_t> buffer_ = std::vector<std::uint8_t>(65'536);
 };
 
-}  // namespace understory::velodyne_driver
+}  // namespace understory::lidar_driver

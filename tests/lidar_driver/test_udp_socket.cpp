@@ -5,16 +5,16 @@
 
 #include <string_view>
 
-#include "services/velodyne_driver/udp_socket.hpp"
+#include "services/lidar_driver/udp_socket.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
 
-TEST_CASE("a socket may have descriptor 0", "[velodyne_driver]") {
+TEST_CASE("a socket may have descriptor 0", "[lidar_driver]") {
   const int standard_input = ::dup(STDIN_FILENO);
   ::close(STDIN_FILENO);
   {
-    velodyne_driver::UdpSocket socket("127.0.0.1", 0, 65536);
+    lidar_driver::UdpSocket socket("127.0.0.1", 0, 65536);
     CHECK(socket.file_descriptor() == STDIN_FILENO);
     CHECK_FALSE(socket.receive());
 
