@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "common/io/data_error.hpp"
+#include "common/reference_system/reference_system.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/map_commands.hpp"
 #include "deploy/cli/mcap_export.hpp"
 #include "deploy/cli/slam_results.hpp"
 #include "deploy/cli/text_file.hpp"
@@ -21,6 +24,7 @@ struct ExportOptions {
   std::string log;
   std::filesystem::path out;
   std::vector<std::string> formats{"tum", "csv", "g2o"};
+  std::string frame_of;  ///< A map file in whose frame the drive was.
 };
 
 SlamResults read_results(const std::string& log) {
@@ -39,6 +43,35 @@ SlamResults read_results(const std::string& log) {
 void write(const std::filesystem::path& file, const std::string& text) {
   write_text_file(file, text);
   fmt::print("{}\n", file.string());
+}
+
+/// The map of a drive as GeoJSON, at the place of the map that it began with.
+void export_geojson(const SlamResults& results, const model::MapReference& reference,
+                    const std::filesystem::path& out) {
+  const model::WholeMap map = results.map.whole().value();
+  map_file::StoredMap stored;
+  stored.keyframes = map.keyframes;
+  for (const model::MapLandmark& landmark : map.landmarks) {
+    map_file::StoredLandmark& one = stored.landmarks.emplace_back();
+    one.landmark = landmark;
+    const auto told = results.existence.find(landmark.id);
+    if (told != results.existence.end()) one.existence = told->second.probability;
+  }
+  for (const auto& [layer, text] : map_geojson(stored, reference))
+    write(out / (layer + ".geojson"), text);
+}
+
+/// Where the frame of a drive lies, from the map that it began with.
+model::MapReference frame_of_drive(const ExportOptions& options) {
+  if (options.frame_of.empty())
+    fail(
+        fmt::format("{}: the map in a log is not georeferenced: --frame-of MAP.gpkg names the map "
+                    "that the drive "
+                    "began with; or use `understory map import` and `map georeference`",
+                    options.log));
+  const auto reference = map_file::MapFile(options.frame_of, map_file::Access::kRead).reference();
+  if (!reference) fail(place_missing(options.frame_of));
+  return *reference;
 }
 
 void export_as(const std::string& format, const SlamResults& results,
@@ -60,8 +93,12 @@ void export_as(const std::string& format, const SlamResults& results,
   }
 }
 
-void export_results(const std::string& log, const std::vector<std::string>& formats,
-                    const std::filesystem::path& out) {
+void export_results(const ExportOptions& options) {
+  const std::string& log = options.log;
+  const std::filesystem::path& out = options.out;
+  const bool has_places = std::ranges::find(options.formats, "geojson") != options.formats.end();
+  std::optional<model::MapReference> reference;
+  if (has_places) reference = frame_of_drive(options);
   const auto results = read_results(log);
   if (!results.map.map()) {
     fail(fmt::format("{}: neither a whole MAP nor the start of one in it (run replay first)", log));
@@ -71,7 +108,9 @@ void export_results(const std::string& log, const std::vector<std::string>& form
                results.map.missed());
   }
   std::filesystem::create_directories(out);
-  for (const auto& format : formats) export_as(format, results, out);
+  for (const auto& format : options.formats)
+    format == "geojson" ? export_geojson(results, *reference, out)
+                        : export_as(format, results, out);
 }
 
 /// Streams the log: it needs no map in it, and may be of any length.
@@ -96,7 +135,7 @@ void export_all(ExportOptions options) {
     wrong_usage("--out: several formats need a directory");
   }
   if (has_messages) export_messages(options.log, options.out);
-  if (!options.formats.empty()) export_results(options.log, options.formats, options.out);
+  if (!options.formats.empty()) export_results(options);
 }
 
 void run(const ExportOptions& options) {
@@ -106,6 +145,10 @@ void run(const ExportOptions& options) {
   } catch (const io::LogError& error) {
     fail(error.what());
   } catch (const io::DataError& error) {
+    fail(error.what());
+  } catch (const map_file::MapFileError& error) {
+    fail(error.what());
+  } catch (const reference_system::ReferenceError& error) {
     fail(error.what());
   } catch (const std::filesystem::filesystem_error& error) {
     fail(fmt::format("{}: {}", options.out.string(), error.code().message()));
@@ -124,11 +167,15 @@ void add_export_command(CLI::App& parent) {
       ->add_option("--out", options->out, "Directory for the files; of mcap also a file NAME.mcap")
       ->required();
   command
-      ->add_option("--format", options->formats,
-                   "tum, kitti, csv, g2o: results; mcap: all messages, for Foxglove and Lichtblick")
+      ->add_option(
+          "--format", options->formats,
+          "tum, kitti, csv, g2o: results; geojson: the map by longitude and latitude (needs "
+          "--frame-of); mcap: all messages, for Foxglove and Lichtblick")
       ->delimiter(',')
-      ->check(CLI::IsMember({"tum", "kitti", "csv", "g2o", "mcap"}))
+      ->check(CLI::IsMember({"tum", "kitti", "csv", "g2o", "geojson", "mcap"}))
       ->capture_default_str();
+  command->add_option("--frame-of", options->frame_of,
+                      "A georeferenced map file with which the drive began: for geojson");
   command->callback([options] { run(*options); });
 }
 

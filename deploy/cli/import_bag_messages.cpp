@@ -195,7 +195,12 @@ void BagMessages::take_fix(const bag::Message& message) {
   out.utime = utime_of(fix.header, message.topic);
   out.east_north_m = plane_->east_north_m(fix.latitude_deg, fix.longitude_deg);
   out.sigma_m = fix.sigma_m;
-  log_.add("RAW_GNSS", out, out.utime);
+  gnss_t message_out = wire::to_wire(out);
+  message_out.has_geodetic = 1;
+  message_out.latitude_deg = fix.latitude_deg;
+  message_out.longitude_deg = fix.longitude_deg;
+  message_out.altitude_m = fix.altitude_m;
+  log_.add("RAW_GNSS", message_out, out.utime);
 }
 
 void BagMessages::take_truth(const bag::Message& message) {

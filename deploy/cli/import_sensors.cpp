@@ -57,7 +57,12 @@ void add_oxts(const io::KittiRaw& drive, bool wheels, RecordingLog& log) {
     fix.sigma_m = record.position_sigma_m;
     fix.velocity_mps = record.east_north_velocity_mps;
     fix.velocity_sigma_mps = record.velocity_sigma_mps;
-    log.add("RAW_GNSS", fix);
+    gnss_t message = wire::to_wire(fix);
+    message.has_geodetic = 1;
+    message.latitude_deg = record.latitude_deg;
+    message.longitude_deg = record.longitude_deg;
+    message.altitude_m = record.altitude_m;
+    log.add("RAW_GNSS", message);
     log.add("GROUND_TRUTH",
             truth(record.utime, geometry::SE2(fix.east_north_m, record.roll_pitch_yaw_rad.z())));
   }

@@ -1,4 +1,5 @@
-// `understory map info|check|import|export|merge|close|log|revert|accept|diff`: stored maps.
+// `understory map info|check|import|georeference|export|merge|close|log|revert|accept|diff`: stored
+// maps.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -13,11 +14,13 @@
 #include "common/io/data_error.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/map_file/difference.hpp"
+#include "common/reference_system/reference_system.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/printable.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/map_commands.hpp"
+#include "deploy/cli/map_table.hpp"
 #include "deploy/cli/text_file.hpp"
 
 namespace understory::cli {
@@ -60,6 +63,15 @@ nlohmann::ordered_json summary_json(const MapSummary& map) {
           {"checksum", map.checksum}};
 }
 
+nlohmann::ordered_json reference_json(const std::optional<model::MapReference>& reference) {
+  if (!reference) return nullptr;
+  return {{"system", reference->system},
+          {"latitude_deg", reference->latitude_deg},
+          {"longitude_deg", reference->longitude_deg},
+          {"rotation_rad", reference->rotation_rad},
+          {"definition", reference->definition}};
+}
+
 /// What follows --json is no file.
 CLI::Validator no_dash() {
   return {
@@ -84,14 +96,18 @@ void map_info(const MapOptions& options) {
   const std::vector<MapSummary> maps = file.maps();
   const std::size_t changes = file.history().size();
   if (options.json) {
-    nlohmann::ordered_json json{
-        {"file", options.file}, {"changes", changes}, {"maps", nlohmann::ordered_json::array()}};
+    nlohmann::ordered_json json{{"file", options.file},
+                                {"changes", changes},
+                                {"reference", reference_json(file.reference())},
+                                {"maps", nlohmann::ordered_json::array()}};
     for (const MapSummary& map : maps) json["maps"].push_back(summary_json(map));
     fmt::print("{}\n", dumped(json, 2));
     return;
   }
 
   fmt::print("{}: {} maps, {} changes\n", options.file, maps.size(), changes);
+  if (const auto reference = file.reference())
+    fmt::print("{}\n", terminal::printable(place_text(*reference)));
   fmt::print("{:>5} {:>9} {:>9} {:>9} {:19} {:12} {} (from)\n", "map", "trunks", "corners",
              "keyframes", "made", "checksum", "name");
   for (const MapSummary& map : maps) {
@@ -223,6 +239,11 @@ void print_difference(std::uint32_t map_id, const map_file::MapDifference& diffe
 void map_diff(const MapOptions& options) {
   const MapFile before(options.file, Access::kRead);
   const MapFile after(options.other, Access::kRead);
+  const auto frame_before = before.reference();
+  const auto frame_after = after.reference();
+  if (frame_before && frame_after && frame_before->definition != frame_after->definition)
+    fail(fmt::format("{} and {}: are georeferenced differently: {}; {}", options.file,
+                     options.other, place_text(*frame_before), place_text(*frame_after)));
   const std::set<std::uint32_t> before_ids = ids_in(before);
   const std::set<std::uint32_t> after_ids = ids_in(after);
   std::set<std::uint32_t> all = before_ids;
@@ -264,6 +285,8 @@ void guarded_map_work(const std::function<void()>& work) {
     fail(error.what());
   } catch (const io::DataError& error) {
     fail(error.what());
+  } catch (const reference_system::ReferenceError& error) {
+    fail(error.what());
   } catch (const io::LogError& error) {
     fail(error.what());
   } catch (const std::filesystem::filesystem_error& error) {
@@ -293,6 +316,7 @@ void add_map_command(CLI::App& parent) {
   add_json_flag(*add("info", "What is in it", map_info), options->json);
   add("check", "What is wrong with it; exit status 1 when something is", map_check);
   add_map_import(*map);
+  add_map_georeference(*map);
   add_map_export(*map);
   add_map_merge(*map);
   add_map_close(*map);

@@ -13,6 +13,8 @@ namespace understory::cli {
 
 /// `understory map import`: a table of surveyed landmarks, or the maps in a log, into a map file.
 void add_map_import(CLI::App& map);
+/// `understory map georeference`: where the frame of a file's maps lies on the earth.
+void add_map_georeference(CLI::App& map);
 /// `understory map export`: maps of a file as CSV and GeoJSON.
 void add_map_export(CLI::App& map);
 
@@ -26,8 +28,12 @@ void guarded_map_work(const std::function<void()>& work);
 /// A note for a change that is made now.
 map_file::ChangeNote note_now(std::string command, std::string source, std::string text);
 
-/// The layers of a map as GeoJSON (RFC 7946, but in metres of the frame `map`): for each layer with
-/// its name. Layers without a feature are left out, but for landmarks and trajectory.
-std::vector<std::pair<std::string, std::string>> map_geojson(const map_file::StoredMap& map);
+/// Why a file cannot be given out as GeoJSON, and what helps.
+std::string place_missing(const std::string& file);
+/// The layers of a map as GeoJSON (RFC 7946: longitude and latitude of WGS 84, nine decimals), each
+/// with its name. Layers without a feature are left out, but for landmarks and trajectory. Throws
+/// reference_system::ReferenceError.
+std::vector<std::pair<std::string, std::string>> map_geojson(const map_file::StoredMap& map,
+                                                             const model::MapReference& reference);
 
 }  // namespace understory::cli

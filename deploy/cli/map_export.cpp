@@ -1,10 +1,14 @@
 // `understory map export`: maps in formats that other tools read.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/reference_system/reference_system.hpp"
+#include "deploy/cli/failure.hpp"
 #include "deploy/cli/map_commands.hpp"
 #include "deploy/cli/slam_results.hpp"
 #include "deploy/cli/text_file.hpp"
@@ -18,10 +22,26 @@ using Json = nlohmann::ordered_json;
 struct MapExportOptions {
   std::string file;
   fs::path out;
-  std::vector<std::string> formats{"csv", "geojson"};
+  std::vector<std::string> formats;  ///< Empty: what the file can be given out in.
 };
 
-Json place(const Eigen::Vector2d& position_m) { return {position_m.x(), position_m.y()}; }
+/// Places of a map on the earth.
+class Earth {
+ public:
+  explicit Earth(const model::MapReference& reference)
+      : wgs84_(reference_system::to_wgs84(reference)) {}
+
+  Json place(const Eigen::Vector2d& position_m) const {
+    const Eigen::Vector2d at_deg = wgs84_.forward(position_m);
+    return {rounded(at_deg.x()), rounded(at_deg.y())};
+  }
+
+ private:
+  /// To 0.1 mm.
+  static double rounded(double degrees) { return std::round(degrees * 1e9) / 1e9; }
+
+  reference_system::Transformation wgs84_;
+};
 
 template <class T>
 Json or_null(const std::optional<T>& value) {
@@ -55,7 +75,7 @@ ExistenceById existence_of(const map_file::StoredMap& map) {
   return existence;
 }
 
-Json landmark_features(const map_file::StoredMap& map) {
+Json landmark_features(const map_file::StoredMap& map, const Earth& earth) {
   const ExistenceById existence = existence_of(map);
   Json features = Json::array();
   for (const map_file::StoredLandmark& one : map.landmarks) {
@@ -63,7 +83,7 @@ Json landmark_features(const map_file::StoredMap& map) {
     const bool is_trunk = landmark.kind == model::LandmarkKind::kTrunk;
     const auto told = existence.find(landmark.id);
     features.push_back(
-        feature("Point", place(landmark.position_m),
+        feature("Point", earth.place(landmark.position_m),
                 {{"landmark_id", landmark.id},
                  {"submap_id", or_null(one.submap_id)},
                  {"covariance_m2", matrix_json(landmark.covariance_m2)},
@@ -76,10 +96,10 @@ Json landmark_features(const map_file::StoredMap& map) {
   return features;
 }
 
-Json keyframe_features(const map_file::StoredMap& map) {
+Json keyframe_features(const map_file::StoredMap& map, const Earth& earth) {
   Json features = Json::array();
   for (const model::KeyframePose& pose : map.keyframes) {
-    features.push_back(feature("Point", place(pose.map_T_vehicle.translation()),
+    features.push_back(feature("Point", earth.place(pose.map_T_vehicle.translation()),
                                {{"sequence", pose.keyframe_sequence},
                                 {"utime", pose.utime},
                                 {"heading_rad", pose.map_T_vehicle.theta()},
@@ -88,23 +108,23 @@ Json keyframe_features(const map_file::StoredMap& map) {
   return features;
 }
 
-Json border_features(const map_file::StoredMap& map) {
+Json border_features(const map_file::StoredMap& map, const Earth& earth) {
   Json features = Json::array();
   for (const map_file::SubmapBorder& border : map.submap_borders) {
     Json ring = Json::array();
-    for (const Eigen::Vector2d& corner : border.corners_m) ring.push_back(place(corner));
-    ring.push_back(place(border.corners_m.front()));
+    for (const Eigen::Vector2d& corner : border.corners_m) ring.push_back(earth.place(corner));
+    ring.push_back(earth.place(border.corners_m.front()));
     features.push_back(
         feature("Polygon", Json::array({std::move(ring)}), {{"submap_id", border.submap_id}}));
   }
   return features;
 }
 
-Json loop_features(const map_file::StoredMap& map) {
+Json loop_features(const map_file::StoredMap& map, const Earth& earth) {
   Json features = Json::array();
   for (const map_file::LoopClosure& loop : map.loop_closures) {
     features.push_back(
-        feature("LineString", Json::array({place(loop.from_m), place(loop.to_m)}),
+        feature("LineString", Json::array({earth.place(loop.from_m), earth.place(loop.to_m)}),
                 {{"from_sequence", loop.from_sequence}, {"to_sequence", loop.to_sequence}}));
   }
   return features;
@@ -123,43 +143,59 @@ void write_export(const fs::path& file, const std::string& text) {
   fmt::print("{}\n", file.string());
 }
 
-void export_map_as(const std::string& format, const map_file::StoredMap& map, const fs::path& out) {
+void export_map_as(const std::string& format, const map_file::StoredMap& map,
+                   const std::optional<model::MapReference>& reference, const fs::path& out) {
   if (format == "csv") {
     const model::WholeMap whole = whole_map_of(map);
     write_export(out / "landmarks.csv", landmarks_csv(whole, existence_of(map)));
     write_export(out / "keyframes.csv", keyframes_csv(whole));
   } else {
-    for (const auto& [layer, text] : map_geojson(map))
+    for (const auto& [layer, text] : map_geojson(map, reference.value()))
       write_export(out / (layer + ".geojson"), text);
   }
 }
 
-void run_map_export(const MapExportOptions& options) {
+void run_map_export(MapExportOptions options) {
   const map_file::MapFile file(options.file, map_file::Access::kRead);
+  const std::optional<model::MapReference> reference = file.reference();
+  const bool is_placed = reference.has_value();
+  if (options.formats.empty()) {
+    options.formats = {"csv"};
+    if (is_placed) options.formats.emplace_back("geojson");
+  }
+  if (!is_placed && std::ranges::find(options.formats, "geojson") != options.formats.end())
+    fail(place_missing(options.file));
   for (const map_file::MapSummary& summary : file.maps()) {
     const map_file::StoredMap map = file.read(summary.map_id);
     const fs::path folder = options.out / fmt::format("map-{}", summary.map_id);
     fs::create_directories(folder);
-    for (const std::string& format : options.formats) export_map_as(format, map, folder);
+    for (const std::string& format : options.formats) export_map_as(format, map, reference, folder);
   }
 }
 
 }  // namespace
 
-std::vector<std::pair<std::string, std::string>> map_geojson(const map_file::StoredMap& map) {
+std::string place_missing(const std::string& file) {
+  return fmt::format(
+      "{}: GeoJSON needs longitude and latitude, and the map is not georeferenced: `understory map "
+      "georeference` does it from control points, from the fixes of a drive or from another map",
+      file);
+}
+
+std::vector<std::pair<std::string, std::string>> map_geojson(const map_file::StoredMap& map,
+                                                             const model::MapReference& reference) {
+  const Earth earth(reference);
   std::vector<std::pair<std::string, std::string>> layers;
   const auto add = [&](const std::string& name, Json features, bool is_always) {
     if (features.empty() && !is_always) return;
-    const Json collection{{"type", "FeatureCollection"},
-                          {"name", name},
-                          {"frame", "map, undefined Cartesian, metres"},
-                          {"features", std::move(features)}};
+    const Json collection{
+        {"type", "FeatureCollection"}, {"name", name}, {"features", std::move(features)}};
     layers.emplace_back(name, dumped(collection, -1) + "\n");
   };
-  add("landmarks", landmark_features(map), true);
-  add("trajectory", keyframe_features(map), true);
-  add("submap_borders", border_features(map), false);
-  add("loop_closures", loop_features(map), false);
+  add("landmarks", landmark_features(map, earth), true);
+  add("trajectory", keyframe_features(map, earth), true);
+  add("submap_borders", border_features(map, earth), false);
+  add("loop_closures", loop_features(map, earth), false);
   return layers;
 }
 
@@ -169,10 +205,13 @@ void add_map_export(CLI::App& map) {
   command->add_option("file", options->file, "A map file")->required();
   command->add_option("--out", options->out, "Directory; each map has a folder map-N in it")
       ->required();
-  command->add_option("--format", options->formats, "csv, geojson")
+  command
+      ->add_option(
+          "--format", options->formats,
+          "csv: metres of the map; geojson: longitude and latitude (default: both where it is "
+          "known where the map lies, else csv)")
       ->delimiter(',')
-      ->check(CLI::IsMember({"csv", "geojson"}))
-      ->capture_default_str();
+      ->check(CLI::IsMember({"csv", "geojson"}));
   command->callback([options] { guarded_map_work([&] { run_map_export(*options); }); });
 }
 

@@ -9,6 +9,7 @@
 
 #include "common/map_file/opening.hpp"
 #include "common/map_merge/fusion.hpp"
+#include "common/reference_system/reference_system.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/failure.hpp"
@@ -55,7 +56,18 @@ struct MapsToMerge {
   geometry::SE2 first_T_at;     ///< See MapMergeOptions::first_at.
   geometry::SE2 second_T_at;
   std::vector<map_file::MapSummary> known;  ///< All maps of the first one's file.
+  std::optional<model::MapReference> first_reference;
+  std::optional<model::MapReference> second_reference;
 };
+
+/// By which the georeferences of two files may differ.
+constexpr double kSamePlace_m = 0.5;
+
+Eigen::Vector2d middle_of(const StoredMap& map) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const map_file::StoredLandmark& one : map.landmarks) sum += one.landmark.position_m;
+  return map.landmarks.empty() ? sum : sum / static_cast<double>(map.landmarks.size());
+}
 
 /// The one that is asked for, or the only one that has landmarks.
 StoredMap chosen_of(const MapFile& file, std::uint32_t map_id, const char* option) {
@@ -103,6 +115,8 @@ MapsToMerge read_maps_to_merge(const MapMergeOptions& options) {
 
   MapsToMerge maps;
   maps.known = file.maps();
+  maps.first_reference = file.reference();
+  maps.second_reference = other ? other->reference() : maps.first_reference;
   maps.first = chosen_of(file, options.first_map, "--first-map");
   maps.second = chosen_of(other ? *other : file, options.second_map, "--second-map");
   maps.second_id = maps.second.map_id;
@@ -228,6 +242,26 @@ Alignment align_shown(const MapsToMerge& maps, const map_merge::AlignmentParamet
                           });
 }
 
+/// Landmarks decide; what the files say of their places is compared with that.
+void report_references(const MapMergeOptions& options, const MapsToMerge& maps,
+                       const Alignment& alignment) {
+  if (maps.second_reference && !maps.first_reference)
+    fmt::print(stderr,
+               "{}: its place on the earth is not taken over, since the frame of {} stays "
+               "(`understory map georeference`)\n",
+               options.second.string(), options.first.string());
+  if (!maps.first_reference || !maps.second_reference) return;
+  const reference_system::Transformation between(maps.second_reference->definition,
+                                                 maps.first_reference->definition);
+  const Eigen::Vector2d middle_m = middle_of(maps.second);
+  const double apart_m = (between.forward(middle_m) - alignment.first_T_second * middle_m).norm();
+  if (apart_m > kSamePlace_m)
+    fmt::print(stderr,
+               "{} and {}: are {:.2f} m apart by their georeferences where their landmarks are the "
+               "same; that of the first stays\n",
+               options.first.string(), options.second.string(), apart_m);
+}
+
 void run_map_merge(const MapMergeOptions& options) {
   terminal::catch_interrupts();
   const MapsToMerge maps = read_maps_to_merge(options);
@@ -243,6 +277,7 @@ void run_map_merge(const MapMergeOptions& options) {
   const MergedMaps merged =
       map_merge::fuse(maps.first, maps.second, alignment, {.unknown_sigma_m = options.sigma_m});
   const std::string where = write_merged(options, maps, alignment, merged);
+  report_references(options, maps, alignment);
   if (options.json) {
     fmt::print("{}\n", dumped(merge_json(options, alignment, merged, where), 2));
   } else {

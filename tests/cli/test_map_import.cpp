@@ -208,6 +208,13 @@ TEST_CASE("what is imported has the states of its landmarks, and says so", "[cli
   CHECK(info["maps"][0]["existence_states"] == 1);
   CHECK(info["maps"][0]["not_in_use"] == 1);
 
+  {
+    const std::string points =
+        "map_x_m,map_y_m,east,north\n0,0,401000,5654000\n9,0,401009,5654000\n";
+    write_bytes(directory / "points.csv", Bytes(points.begin(), points.end()));
+    run("map georeference " + file + " --crs EPSG:25832 --control-points " +
+        (directory / "points.csv").string());
+  }
   run("map export " + file + " --format geojson --out " + (directory / "out").string());
   const auto layer =
       nlohmann::json::parse(read_text(directory / "out" / "map-1" / "landmarks.geojson"));
