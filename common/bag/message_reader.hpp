@@ -49,6 +49,8 @@ class MessageReader {
   /// The next bytes of an array of fixed length.
   std::span<const std::uint8_t> take(std::size_t count);
 
+  /// Bytes that are left.
+  std::size_t rest() const { return data_.size() - at_; }
   /// ROS 1 has the field `seq` in its header, and stamps without sign.
   Encoding encoding() const { return encoding_; }
 

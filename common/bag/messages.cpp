@@ -180,15 +180,70 @@ NavSatFix read_nav_sat_fix(MessageReader& reader) {
   return fix;
 }
 
-VelodyneScan read_velodyne_scan(MessageReader& reader) {
-  VelodyneScan scan;
-  scan.header = read_header(reader);
-  const std::size_t packets = reader.count(8 + io::kVelodyneDataBytes);
-  for (std::size_t i = 0; i < packets; ++i) {
-    const std::int64_t stamp = read_stamp(reader);
-    scan.packets.push_back({stamp, reader.take(io::kVelodyneDataBytes)});
+namespace {
+
+/// How drivers wrote the packets of a scan; the definitions changed under the same name.
+struct ScanLayout {
+  bool has_header = true;
+  std::size_t fixed_bytes = 0;  ///< Of a packet's array; 0 = a sequence.
+  bool has_size = true;         ///< How many bytes of it are the packet's stands behind.
+};
+
+std::optional<PacketScan> read_scan(MessageReader reader, const ScanLayout& layout) {
+  constexpr std::size_t kStamp = 8;
+  constexpr std::size_t kPadding = 4;
+  PacketScan scan;
+  try {
+    if (layout.has_header) scan.header = read_header(reader);
+    const std::size_t packets = reader.count(kStamp + std::max<std::size_t>(layout.fixed_bytes, 4));
+    for (std::size_t i = 0; i < packets; ++i) {
+      PacketScan::Packet packet{read_stamp(reader), {}};
+      packet.bytes = layout.fixed_bytes > 0 ? reader.take(layout.fixed_bytes) : reader.bytes();
+      const std::size_t size =
+          layout.has_size ? reader.number<std::uint32_t>() : packet.bytes.size();
+      if (size > packet.bytes.size()) return std::nullopt;
+      packet.bytes = packet.bytes.first(size);
+      scan.packets.push_back(packet);
+    }
+  } catch (const io::DataError&) {
+    return std::nullopt;
   }
+  if (reader.rest() >= kPadding) return std::nullopt;
   return scan;
+}
+
+/// HesaiLidar_General_ROS and Autoware's pandar_msgs; HesaiLidar_ROS_2.0, older ones for ROS 2
+/// without header.
+std::span<const ScanLayout> layouts_of(const std::string& type) {
+  static constexpr std::array kVelodyne{ScanLayout{true, io::kVelodyneDataBytes, false}};
+  static constexpr std::array kPandar{ScanLayout{true, 0, true}, ScanLayout{true, 1500, true}};
+  static constexpr std::array kHesai{ScanLayout{true, 0, true}, ScanLayout{false, 0, true}};
+  if (type == "velodyne_msgs/VelodyneScan") return kVelodyne;
+  if (type == "pandar_msgs/PandarScan" || type == "hesai_lidar/PandarScan") return kPandar;
+  if (type == "hesai_ros_driver/UdpFrame") return kHesai;
+  return {};
+}
+
+}  // namespace
+
+bool is_ouster_packet_type(const std::string& type) {
+  return type == "ouster_ros/PacketMsg" || type == "ouster_msgs/PacketMsg" ||
+         type == "ouster_sensor_msgs/PacketMsg";
+}
+
+bool is_packet_type(const std::string& type) {
+  return is_ouster_packet_type(type) || !layouts_of(type).empty();
+}
+
+PacketScan read_packets(const MessageReader& message, const std::string& type) {
+  if (is_ouster_packet_type(type)) {
+    MessageReader reader = message;
+    return {{}, {{0, reader.bytes()}}};
+  }
+  for (const ScanLayout& layout : layouts_of(type)) {
+    if (auto scan = read_scan(message, layout)) return *std::move(scan);
+  }
+  throw io::DataError("no packets as any version of " + type + " has them");
 }
 
 std::vector<Pose> read_transforms(MessageReader& reader) {

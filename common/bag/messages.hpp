@@ -92,11 +92,12 @@ struct NavSatFix {
   double sigma_m = 0.0;  ///< Horizontal, per axis; 0 = unknown.
 };
 
-/// velodyne_msgs/VelodyneScan: packets as they came.
-struct VelodyneScan {
+/// UDP packets of a laser as they came: velodyne_msgs/VelodyneScan, PandarScan of pandar_msgs and
+/// hesai_lidar, hesai_ros_driver/UdpFrame, PacketMsg of Ouster's drivers (one packet, no header).
+struct PacketScan {
   /// One packet; `bytes` refers to the message's.
   struct Packet {
-    std::int64_t stamp_ns = 0;
+    std::int64_t stamp_ns = 0;  ///< 0 = the message has none.
     std::span<const std::uint8_t> bytes;
   };
   Header header;
@@ -121,8 +122,12 @@ Odometry read_odometry(MessageReader& reader, const std::string& type);
 bool is_twist_type(const std::string& type);
 /// sensor_msgs/NavSatFix.
 NavSatFix read_nav_sat_fix(MessageReader& reader);
-/// velodyne_msgs/VelodyneScan.
-VelodyneScan read_velodyne_scan(MessageReader& reader);
+/// A message of a packet type, of which nothing was read yet.
+PacketScan read_packets(const MessageReader& message, const std::string& type);
+/// Whether read_packets() knows the type.
+bool is_packet_type(const std::string& type);
+/// Whether it is PacketMsg of one of Ouster's drivers.
+bool is_ouster_packet_type(const std::string& type);
 /// tf2_msgs/TFMessage.
 std::vector<Pose> read_transforms(MessageReader& reader);
 /// A message of a pose type.

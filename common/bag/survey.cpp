@@ -8,6 +8,8 @@
 namespace understory::bag {
 namespace {
 
+/// In which Ouster's packets are decoded; their messages have none.
+constexpr const char* kOusterFrame = "os_sensor";
 constexpr std::uint64_t kCloudsLookedInto = 3;
 constexpr std::uint64_t kForcesLookedAt = 100;
 /// Differences of clocks that are kept: of more messages every second one is dropped, and so on.
@@ -69,9 +71,13 @@ void look_into(const Bag& bag, const Message& message, Survey& survey, TopicSurv
     return;
   }
 
-  const Header header = read_header(reader);
-  if (found.messages == 1) found.frame = header.frame;
-  gathered.differences.add(header.stamp_ns - message.received_ns);
+  const bool has_packets = is_packet_type(topic.type);
+  const Header header = has_packets ? read_packets(reader, topic.type).header : read_header(reader);
+  if (found.messages == 1)
+    found.frame = is_ouster_packet_type(topic.type) ? kOusterFrame : header.frame;
+  if (header.stamp_ns != 0 || !has_packets)
+    gathered.differences.add(header.stamp_ns - message.received_ns);
+  if (has_packets) return;
   if (role == Role::kImu && found.messages <= kForcesLookedAt) {
     MessageReader again = reader_of(bag, message);
     found.force_mps2 += (read_imu(again).specific_force_mps2 - found.force_mps2) /
@@ -79,21 +85,27 @@ void look_into(const Bag& bag, const Message& message, Survey& survey, TopicSurv
   }
   if (role != Role::kCloud || found.messages > kCloudsLookedInto) return;
   look_into_cloud(reader_of(bag, message), topic.type, gathered.decoder);
-  if (!topic.type.starts_with("velodyne_msgs")) found.cloud = gathered.decoder.description();
+  found.cloud = gathered.decoder.description();
 }
 
 }  // namespace
 
 Role role_of(const Topic& topic) {
-  static const std::map<std::string, Role> kRoles{
-      {"sensor_msgs/PointCloud2", Role::kCloud},     {"livox_ros_driver/CustomMsg", Role::kCloud},
-      {"livox_ros_driver2/CustomMsg", Role::kCloud}, {"velodyne_msgs/VelodyneScan", Role::kCloud},
-      {"tf2_msgs/TFMessage", Role::kTransforms},     {"tf/tfMessage", Role::kTransforms},
-      {"sensor_msgs/LaserScan", Role::kScan},        {"sensor_msgs/Imu", Role::kImu},
-      {"nav_msgs/Odometry", Role::kOdometry},        {"sensor_msgs/NavSatFix", Role::kGnss}};
+  static const std::map<std::string, Role> kRoles{{"sensor_msgs/PointCloud2", Role::kCloud},
+                                                  {"livox_ros_driver/CustomMsg", Role::kCloud},
+                                                  {"livox_ros_driver2/CustomMsg", Role::kCloud},
+                                                  {"tf2_msgs/TFMessage", Role::kTransforms},
+                                                  {"tf/tfMessage", Role::kTransforms},
+                                                  {"sensor_msgs/LaserScan", Role::kScan},
+                                                  {"sensor_msgs/Imu", Role::kImu},
+                                                  {"nav_msgs/Odometry", Role::kOdometry},
+                                                  {"sensor_msgs/NavSatFix", Role::kGnss}};
   if (topic.encoding == Encoding::kOther) return Role::kNone;
   const auto role = kRoles.find(topic.type);
   if (role != kRoles.end()) return role->second;
+  if (is_ouster_packet_type(topic.type) && topic.name.find("imu") != std::string::npos)
+    return Role::kImu;
+  if (is_packet_type(topic.type)) return Role::kCloud;
   if (is_twist_type(topic.type)) return Role::kTwist;
   return is_pose_type(topic.type) ? Role::kPose : Role::kNone;
 }

@@ -15,9 +15,9 @@ namespace understory::bag {
 /// What the messages of a type can become.
 enum class Role : std::uint8_t {
   kNone,
-  kCloud,       ///< PointCloud2, Livox CustomMsg, VelodyneScan.
+  kCloud,       ///< PointCloud2, Livox CustomMsg, packets of a laser.
   kScan,        ///< LaserScan.
-  kImu,         ///< Imu.
+  kImu,         ///< Imu, packets of an Ouster's.
   kOdometry,    ///< Odometry; also a pose.
   kTwist,       ///< A velocity alone.
   kGnss,        ///< NavSatFix.

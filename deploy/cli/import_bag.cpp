@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/io/data_error.hpp"
+#include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/printable.hpp"
 #include "common/terminal/progress.hpp"
@@ -99,12 +100,40 @@ void write_settings(const BagImportOptions& options, const std::string& settings
   fmt::print("understory replay {} --config {}\n", options.out, options.config);
 }
 
+/// What a laser's packets need beside them: the file that is named, or, of an Ouster, the text that
+/// its driver put into the bag.
+void describe_laser(bag::Bag& bag, packets::SensorDescription& laser) {
+  if (!laser.source.empty()) {
+    laser.description = io::read_whole_file(laser.source);
+    return;
+  }
+  for (std::size_t i = 0; i < bag.topics().size(); ++i) {
+    const bag::Topic& topic = bag.topics()[i];
+    if (topic.type != "std_msgs/String" || !topic.name.ends_with("metadata")) continue;
+    bag.rewind({i});
+    if (const auto message = bag.next()) {
+      bag::MessageReader reader = reader_of(bag, *message);
+      laser.description = reader.text();
+      laser.source = topic.name;
+    }
+    return;
+  }
+}
+
+bool has_packets(const bag::Bag& bag, const std::optional<std::size_t>& topic) {
+  return topic && bag::is_packet_type(bag.topics()[*topic].type);
+}
+
 void import_chosen(const BagImportOptions& options, bag::Bag& bag, const bag::Survey& survey,
                    const BagMounts& mounts) {
   const BagChoice choice = choose_bag_topics(bag.topics(), options.topics);
   if (choice.all().empty())
     throw io::DataError("nothing that can be imported; --list shows what there is");
   BagConversion conversion = options.conversion;
+  if (conversion.cloud.max_range_m != bag::CloudOptions{}.max_range_m)
+    conversion.laser.max_range_m = conversion.cloud.max_range_m;
+  if (has_packets(bag, choice.cloud) || has_packets(bag, choice.imu))
+    describe_laser(bag, conversion.laser);
   conversion.by_reception = topics_named(bag, options.receive_time);
   std::vector<std::string> remarks = bag.remarks();
   remarks.insert(remarks.end(), choice.remarks.begin(), choice.remarks.end());
@@ -176,12 +205,12 @@ void add_readings(CLI::App& command, BagImportOptions& options) {
                   "Topic whose clock is wrong: its stamps are laid onto the recorder's clock")
       ->allow_extra_args(false);
   add_cloud_options(command, conversion.cloud);
-  command
-      .add_option("--model", conversion.velodyne_model,
-                  "Of Velodyne packets: vlp16, vlp32c, hdl32e")
-      ->check(CLI::IsMember({"vlp16", "vlp32c", "hdl32e"}));
-  command.add_option("--calibration", conversion.velodyne_calibration,
-                     "The HDL-64E's own XML or YAML file");
+  command.add_option("--model", conversion.laser.model,
+                     "Of packets; default: what they look like. One of " + packets::known_models());
+  command.add_option(
+      "--metadata,--calibration", conversion.laser.source,
+      "Of packets: Ouster's metadata (JSON; default: the bag's), the HDL-64E's XML or YAML file, "
+      "Hesai's angle correction file (CSV)");
   command.add_option("--wheelbase", conversion.wheelbase_m, "For the steering of RAW_WHEELS [m]")
       ->check(CLI::Range(0.1, 30.0))
       ->capture_default_str();

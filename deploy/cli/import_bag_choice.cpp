@@ -32,7 +32,7 @@ const std::vector<Slot>& slots() {
        &BagTopics::cloud,
        &BagChoice::cloud,
        "RAW_SWEEP",
-       "PointCloud2, Livox CustomMsg or VelodyneScan"},
+       "PointCloud2, Livox CustomMsg or packets of a laser"},
       {"scan", {Role::kScan}, true, &BagTopics::scan, &BagChoice::scan, "RAW_SCAN", "LaserScan"},
       {"imu", {Role::kImu}, true, &BagTopics::imu, &BagChoice::imu, "RAW_IMU", "Imu"},
       {"odometry",

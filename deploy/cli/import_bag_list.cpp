@@ -158,7 +158,8 @@ void print_bag_list(const std::string& path, const bag::Bag& bag, const bag::Sur
     const bag::TopicSurvey& found = survey.topics[i];
     const std::string name = terminal::printable(bag.topics()[i].name);
     if (!found.cloud.empty()) fmt::print("{}: {}\n", name, terminal::printable(found.cloud));
-    if (role_of(bag.topics()[i]) == bag::Role::kImu && found.messages > 0)
+    if (role_of(bag.topics()[i]) == bag::Role::kImu && found.messages > 0 &&
+        !bag::is_packet_type(bag.topics()[i].type))
       fmt::print("{}: {}\n", name, force_text(found, mounts));
     if (!found.fault.empty()) fmt::print("{}: {}\n", name, terminal::printable(found.fault));
     if (uses[i].starts_with("RAW_")) sensors.push_back(i);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/io/data_error.hpp"
-#include "common/io/text_file.hpp"
+#include "common/packets/survey.hpp"
 #include "understory/ground_truth_t.hpp"
 
 namespace understory::cli {
@@ -17,27 +17,9 @@ namespace {
 constexpr double kSlow_mps = 0.1;
 constexpr double kMoved_m = 1.0;
 
-std::optional<io::VelodyneModel> model_of_packet(std::span<const std::uint8_t> packet) {
-  for (const io::VelodyneModel model :
-       {io::VelodyneModel::kVlp16, io::VelodyneModel::kVlp32c, io::VelodyneModel::kHdl32e}) {
-    if (!check_velodyne_packet(packet, model)) return model;
-  }
-  return std::nullopt;
-}
-
-io::VelodyneCalibration calibration_for(const BagConversion& conversion,
-                                        std::span<const std::uint8_t> packet) {
-  if (!conversion.velodyne_calibration.empty())
-    return io::parse_hdl64_calibration(io::read_whole_file(conversion.velodyne_calibration),
-                                       conversion.velodyne_calibration);
-  const auto model = conversion.velodyne_model.empty()
-                         ? model_of_packet(packet)
-                         : io::velodyne_model(conversion.velodyne_model);
-  if (!model)
-    throw io::DataError(
-        "packets of a model that they do not name: --model vlp16, vlp32c, hdl32e, or "
-        "--calibration FILE for an hdl64e");
-  return velodyne_calibration(*model);
+/// Hesai's drivers have x to the right and y ahead where the decoder has x ahead and y to the left.
+void turn_to_driver(model::PointSweep& sweep) {
+  for (model::SweepPoint& point : sweep.points) point.x_m = -std::exchange(point.y_m, point.x_m);
 }
 
 double yaw_of(const Eigen::Isometry3d& pose) {
@@ -45,11 +27,6 @@ double yaw_of(const Eigen::Isometry3d& pose) {
 }
 
 }  // namespace
-
-/// Made when the first packet comes.
-struct BagMessages::Velodyne {
-  io::VelodyneDecoder decoder;
-};
 
 BagMessages::BagMessages(const bag::Bag& bag, const bag::Survey& survey, const BagChoice& choice,
                          const BagMounts& mounts, BagConversion conversion, BagLog& log)
@@ -61,8 +38,6 @@ BagMessages::BagMessages(const bag::Bag& bag, const bag::Survey& survey, const B
       log_(log),
       numbers_(bag.topics().size(), 0),
       decoder_(conversion_.cloud) {}
-
-BagMessages::~BagMessages() = default;
 
 void BagMessages::take(const bag::Message& message) {
   const std::uint64_t number = ++numbers_[message.topic];
@@ -111,10 +86,8 @@ void BagMessages::add_sweep(const model::PointSweep& sweep) {
 
 void BagMessages::take_cloud(const bag::Message& message) {
   const std::string& type = bag_.topics()[message.topic].type;
+  if (bag::is_packet_type(type)) return take_packets(message);
   bag::MessageReader reader = reader_of(bag_, message);
-  if (type == "velodyne_msgs/VelodyneScan")
-    return take_packets(read_velodyne_scan(reader), shift_ns(message.topic));
-
   model::PointSweep sweep = type == "sensor_msgs/PointCloud2"
                                 ? decoder_.decode(read_point_cloud(reader))
                                 : decoder_.decode(read_livox_cloud(reader));
@@ -123,14 +96,40 @@ void BagMessages::take_cloud(const bag::Message& message) {
   add_sweep(sweep);
 }
 
-void BagMessages::take_packets(const bag::VelodyneScan& scan, std::int64_t shift_ns) {
-  for (const bag::VelodyneScan::Packet& packet : scan.packets) {
-    if (!velodyne_)
-      velodyne_ = std::make_unique<Velodyne>(
-          Velodyne{io::VelodyneDecoder(calibration_for(conversion_, packet.bytes))});
-    if (const auto sweep =
-            velodyne_->decoder.add(packet.bytes, (packet.stamp_ns + shift_ns) / 1000))
-      add_sweep(*sweep);
+void BagMessages::make_laser(const bag::PacketScan::Packet& packet, const std::string& type) {
+  packets::SensorDescription laser = conversion_.laser;
+  if (laser.model.empty() && bag::is_ouster_packet_type(type)) laser.model = "ouster";
+  if (laser.model.empty()) {
+    const packets::Recognised found =
+        packets::recognise({0, 0, 0, 0, {packet.bytes.begin(), packet.bytes.end()}});
+    if (found.model.empty())
+      throw io::DataError(fmt::format("packets of {} bytes ({}): --model is one of {}",
+                                      packet.bytes.size(), found.text, packets::known_models()));
+    laser.model = found.model;
+  }
+  laser_ = packets::make_decoder(laser);
+  laser_model_ = laser.model;
+}
+
+void BagMessages::take_packets(const bag::Message& message) {
+  const std::string& type = bag_.topics()[message.topic].type;
+  const bag::MessageReader reader = reader_of(bag_, message);
+  for (const bag::PacketScan::Packet& packet : read_packets(reader, type).packets) {
+    const std::int64_t stamp_ns =
+        packet.stamp_ns != 0 ? packet.stamp_ns + shift_ns(message.topic) : message.received_ns;
+    if (!laser_) make_laser(packet, type);
+    take_readings(add(*laser_, {packet.bytes, stamp_ns / 1000}));
+  }
+}
+
+void BagMessages::take_readings(const packets::Readings& readings) {
+  if (choice_.imu && bag::is_packet_type(bag_.topics()[*choice_.imu].type)) {
+    for (const model::ImuSample& sample : readings.imu) log_.add("RAW_IMU", sample, sample.utime);
+  }
+  if (!choice_.cloud) return;
+  for (model::PointSweep sweep : readings.sweeps) {
+    if (std::holds_alternative<packets::HesaiStream>(*laser_)) turn_to_driver(sweep);
+    add_sweep(sweep);
   }
 }
 
@@ -143,6 +142,7 @@ void BagMessages::take_scan(const bag::Message& message) {
 }
 
 void BagMessages::take_imu(const bag::Message& message) {
+  if (bag::is_packet_type(bag_.topics()[message.topic].type)) return take_packets(message);
   bag::MessageReader reader = reader_of(bag_, message);
   const bag::Imu imu = read_imu(reader);
   model::ImuSample sample;
@@ -224,8 +224,10 @@ void BagMessages::take_truth(const bag::Message& message) {
 }
 
 void BagMessages::finish() {
-  if (velodyne_) {
-    if (const auto sweep = velodyne_->decoder.finish()) add_sweep(*sweep);
+  if (laser_) {
+    packets::Readings last;
+    if (auto sweep = packets::finish(*laser_)) last.sweeps.push_back(*std::move(sweep));
+    take_readings(last);
   }
   if (choice_.odometry && !conversion_.has_speed_from_pose && fastest_mps_ == 0.0 &&
       farthest_m_ > kMoved_m)
@@ -237,10 +239,10 @@ void BagMessages::finish() {
 
 std::string BagMessages::cloud_text() const {
   if (!choice_.cloud) return {};
-  if (!velodyne_) return decoder_.description();
-  const io::VelodyneCounts& counts = velodyne_->decoder.counts();
-  return fmt::format("{} Velodyne packets, {} refused, {} gaps", counts.packets, counts.refused,
-                     counts.lost_azimuth);
+  if (!laser_) return decoder_.description();
+  const packets::StreamCounts& counts = packets::counts(*laser_);
+  return fmt::format("{} packets of {}, {} refused, {} gaps", counts.packets, laser_model_,
+                     counts.refused, counts.gaps);
 }
 
 std::vector<std::string> BagMessages::remarks() const {

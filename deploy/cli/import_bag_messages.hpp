@@ -8,7 +8,7 @@
 
 #include "common/bag/survey.hpp"
 #include "common/io/oxts.hpp"
-#include "common/io/velodyne.hpp"
+#include "common/packets/decoder.hpp"
 #include "deploy/cli/import_bag_choice.hpp"
 #include "deploy/cli/import_bag_log.hpp"
 #include "deploy/cli/import_bag_mounts.hpp"
@@ -18,8 +18,8 @@ namespace understory::cli {
 /// How messages are taken.
 struct BagConversion {
   bag::CloudOptions cloud;
-  std::string velodyne_model;          ///< Of VelodyneScan; empty = by the packets.
-  std::string velodyne_calibration;    ///< A file, for the HDL-64E.
+  /// Of packets: model (empty = what they look like), the text that it needs, its source.
+  packets::SensorDescription laser;
   double wheelbase_m = 2.7;            ///< For the steering of RAW_WHEELS.
   bool has_speed_from_pose = false;    ///< RAW_WHEELS from the poses of odometry, not its twist.
   std::string truth_frame;             ///< Whose pose the truth is; empty = as the message says.
@@ -32,7 +32,6 @@ class BagMessages {
   /// What it refers to must outlive it.
   BagMessages(const bag::Bag& bag, const bag::Survey& survey, const BagChoice& choice,
               const BagMounts& mounts, BagConversion conversion, BagLog& log);
-  ~BagMessages();
 
   /// Throws io::DataError naming topic and number of the message where it is damaged.
   void take(const bag::Message& message);
@@ -49,10 +48,11 @@ class BagMessages {
   std::vector<std::string> remarks() const;
 
  private:
-  struct Velodyne;
   void convert(const bag::Message& message);
   void take_cloud(const bag::Message& message);
-  void take_packets(const bag::VelodyneScan& scan, std::int64_t shift_ns);
+  void take_packets(const bag::Message& message);
+  void take_readings(const packets::Readings& readings);
+  void make_laser(const bag::PacketScan::Packet& packet, const std::string& type);
   void add_sweep(const model::PointSweep& sweep);
   void take_scan(const bag::Message& message);
   void take_imu(const bag::Message& message);
@@ -70,7 +70,8 @@ class BagMessages {
   BagLog& log_;
   std::vector<std::uint64_t> numbers_;  ///< Messages taken, by topic.
   bag::CloudDecoder decoder_;
-  std::unique_ptr<Velodyne> velodyne_;
+  std::optional<packets::Decoder> laser_;  ///< Made when the first packet comes.
+  std::string laser_model_;
   bool has_times_ = true;
   bool has_rings_ = true;
   std::uint64_t empty_clouds_ = 0;

@@ -116,6 +116,25 @@ inline MessageBytes pose_message(const Serialisation& how, const bag::Pose& pose
   return MessageWriter(how).header(pose.header).pose(pose.pose).bytes();
 }
 
+/// Packets as Hesai's drivers put them into a scan: an array of `fixed_bytes` (0 = a sequence).
+inline MessageBytes scan_message(const Serialisation& how, const bag::PacketScan& scan,
+                                 bool has_header, std::size_t fixed_bytes) {
+  MessageWriter writer(how);
+  if (has_header) writer.header(scan.header);
+  writer.number(static_cast<std::uint32_t>(scan.packets.size()));
+  for (const bag::PacketScan::Packet& packet : scan.packets) {
+    writer.stamp(packet.stamp_ns);
+    if (fixed_bytes == 0) {
+      writer.sequence(packet.bytes);
+    } else {
+      const std::vector<std::uint8_t> rest(fixed_bytes - packet.bytes.size());
+      writer.raw(packet.bytes).raw(rest);
+    }
+    writer.number(static_cast<std::uint32_t>(packet.bytes.size()));
+  }
+  return writer.bytes();
+}
+
 /// A frame in another one, as static transforms have it.
 inline bag::Pose frame_in(const std::string& parent, const std::string& child,
                           const Eigen::Isometry3d& parent_T_child) {

@@ -65,6 +65,40 @@ void check_cuts(const Serialisation& how, const MessageBytes& bytes, std::size_t
   }
 }
 
+constexpr const char* kVelodyne = "velodyne_msgs/VelodyneScan";
+
+/// Every version of the messages, each read without being told which it is.
+void check_hesai_scans(Random& random, const Serialisation& how) {
+  std::vector<MessageBytes> payloads;
+  for (std::size_t i = 0; i < 1 + random() % 4; ++i)
+    payloads.emplace_back(568 + random() % 900, static_cast<std::uint8_t>(random()));
+  bag::PacketScan scan{random_header(random), {}};
+  for (const MessageBytes& payload : payloads)
+    scan.packets.push_back({1000 + static_cast<std::int64_t>(scan.packets.size()), payload});
+
+  const auto check = [&](const std::string& type, bool has_header, std::size_t fixed_bytes) {
+    const MessageBytes bytes = scan_message(how, scan, has_header, fixed_bytes);
+    CAPTURE(type, has_header, fixed_bytes);
+    const bag::MessageReader reader(bytes, how.encoding);
+    const bag::PacketScan found = read_packets(reader, type);
+    REQUIRE(found.packets.size() == payloads.size());
+    if (has_header) CHECK(found.header.stamp_ns == scan.header.stamp_ns);
+    for (std::size_t i = 0; i < payloads.size(); ++i) {
+      CHECK(found.packets[i].stamp_ns == scan.packets[i].stamp_ns);
+      CHECK(std::ranges::equal(found.packets[i].bytes, payloads[i]));
+    }
+    const MessageBytes shorter(bytes.begin(), bytes.end() - 5);
+    const bag::MessageReader cut(shorter, how.encoding);
+    CHECK_THROWS_WITH(read_packets(cut, type), Catch::Matchers::Contains("no packets"));
+  };
+  for (const char* type : {"pandar_msgs/PandarScan", "hesai_lidar/PandarScan"}) {
+    check(type, true, 0);
+    check(type, true, 1500);
+  }
+  check("hesai_ros_driver/UdpFrame", true, 0);
+  check("hesai_ros_driver/UdpFrame", false, 0);
+}
+
 TEST_CASE("bag messages: IMU, odometry, fix and poses come back") {
   Random random(1);
   for (int round = 0; round < 30; ++round) {
@@ -191,15 +225,17 @@ TEST_CASE("bag messages: Livox clouds and packets come back") {
       for (std::uint8_t i = 0; i < 2; ++i)
         packets.stamp(77 + i).raw(MessageBytes(io::kVelodyneDataBytes, i));
       bag::MessageReader packet_reader(packets.bytes(), how.encoding);
-      const bag::VelodyneScan packets_found = read_velodyne_scan(packet_reader);
+      const bag::PacketScan packets_found = read_packets(packet_reader, kVelodyne);
       REQUIRE(packets_found.packets.size() == 2);
       CHECK(packets_found.packets[1].stamp_ns == 78);
       CHECK(packets_found.packets[1].bytes.size() == io::kVelodyneDataBytes);
       CHECK(packets_found.packets[1].bytes[1205] == 1);
 
+      check_hesai_scans(random, how);
+
       if (round > 0) continue;
       check_cuts(how, livox_bytes, 0, [](auto& reader) { read_livox_cloud(reader); });
-      check_cuts(how, packets.bytes(), 0, [](auto& reader) { read_velodyne_scan(reader); });
+      check_cuts(how, packets.bytes(), 0, [](auto& reader) { read_packets(reader, kVelodyne); });
     }
   }
 }
