@@ -35,15 +35,6 @@ void require_database(const fs::path& file) {
 
 fs::path beside(const fs::path& file, const char* suffix) { return file.string() + suffix; }
 
-/// What a killed writer left beside it; empty where there is nothing.
-fs::path left_beside(const fs::path& target) {
-  std::error_code ignored;
-  for (const char* const suffix : {"-wal", "-journal"}) {
-    if (fs::exists(beside(target, suffix), ignored)) return beside(target, suffix);
-  }
-  return {};
-}
-
 /// Whether it is as leave() leaves it; a writer that was killed, or could not end for want of room,
 /// leaves a log, or a file that asks for one.
 bool is_at_rest(const fs::path& file, const fs::path& target) {
@@ -122,33 +113,18 @@ std::unique_ptr<Connection> open_at_rest(const fs::path& file) {
   const bool is_fixed = !can_be_written(left);
   const std::string why = is_fixed ? std::strerror(errno) : error.what();
   cannot(is_fixed ? Fault::kReadOnly : error.fault(), file,
-         fmt::format("a writer that was killed left {}, which must be brought in before the map "
-                     "can be read, and cannot ({}): copy both files to a disk with room",
+         fmt::format("a writer that was killed left {} beside it, which must be brought in before "
+                     "the map can be read or written, and cannot ({}): copy both files to a disk "
+                     "with room",
                      left.filename().string(), why));
 }
 
-}  // namespace
-
-std::unique_ptr<Connection> open_to_read(const fs::path& file) {
-  require_database(file);
-  const fs::path target = target_of(file);
-  const fs::path left = left_beside(target);
-  try {
-    if (!is_at_rest(file, target) && can_be_written(target)) {
-      auto writer = open_to_write(file);
-      if (!leave(*writer)) return writer;
-    }
-    return open_at_rest(file);
-  } catch (const MapFileError& error) {
-    const bool is_of_the_disk = error.fault() == Fault::kUnreadable ||
-                                error.fault() == Fault::kReadOnly || error.fault() == Fault::kFull;
-    if (left.empty() || !is_of_the_disk) throw;
-    cannot_bring_in(file, left, error);
-  }
+bool is_of_the_disk(const MapFileError& error) {
+  return error.fault() == Fault::kUnreadable || error.fault() == Fault::kReadOnly ||
+         error.fault() == Fault::kFull;
 }
 
-std::unique_ptr<Connection> open_to_write(const fs::path& file) {
-  require_database(file);
+std::unique_ptr<Connection> begin_writing(const fs::path& file) {
   const bool is_alone = left_beside(target_of(file)).empty();
   auto connection = std::make_unique<Connection>(file, Access::kWrite, file);
   // Before the first look at it: then the log's index is in memory, and locks stay.
@@ -168,6 +144,43 @@ std::unique_ptr<Connection> open_to_write(const fs::path& file) {
   connection->execute("BEGIN EXCLUSIVE; COMMIT");
   upgrade_schema(*connection);
   return connection;
+}
+
+}  // namespace
+
+std::unique_ptr<Connection> open_to_read(const fs::path& file) {
+  require_database(file);
+  const fs::path target = target_of(file);
+  const fs::path left = left_beside(target);
+  try {
+    if (!is_at_rest(file, target) && can_be_written(target)) {
+      auto writer = begin_writing(file);
+      if (!leave(*writer)) return writer;
+    }
+    return open_at_rest(file);
+  } catch (const MapFileError& error) {
+    if (left.empty() || !is_of_the_disk(error)) throw;
+    cannot_bring_in(file, left, error);
+  }
+}
+
+std::unique_ptr<Connection> open_to_write(const fs::path& file) {
+  require_database(file);
+  const fs::path left = left_beside(target_of(file));
+  try {
+    return begin_writing(file);
+  } catch (const MapFileError& error) {
+    if (left.empty() || !is_of_the_disk(error)) throw;
+    cannot_bring_in(file, left, error);
+  }
+}
+
+fs::path left_beside(const fs::path& target) {
+  std::error_code ignored;
+  for (const char* const suffix : {"-wal", "-journal"}) {
+    if (fs::exists(beside(target, suffix), ignored)) return beside(target, suffix);
+  }
+  return {};
 }
 
 bool leave(const Connection& connection) noexcept {

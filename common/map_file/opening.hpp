@@ -8,6 +8,9 @@
 
 namespace understory::map_file {
 
+/// The log or journal that a killed writer left beside a file; empty where there is none.
+std::filesystem::path left_beside(const std::filesystem::path& file);
+
 /// Opens a map file for reading: one state of it, held until the connection goes. What a killed
 /// writer left beside it is brought in first; where there is no room for that, others are locked
 /// out instead. Throws MapFileError.

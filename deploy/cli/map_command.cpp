@@ -14,6 +14,7 @@
 #include "common/io/data_error.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/map_file/difference.hpp"
+#include "common/map_file/map_look.hpp"
 #include "common/reference_system/reference_system.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/printable.hpp"
@@ -92,7 +93,9 @@ void add_json_flag(CLI::App& command, bool& is_json) {
 }
 
 void map_info(const MapOptions& options) {
-  const MapFile file(options.file, Access::kRead);
+  const map_file::MapLook look(options.file);
+  const MapFile& file = look.file();
+  if (!look.remark().empty()) fmt::print(stderr, "{}: {}\n", options.file, look.remark());
   const std::vector<MapSummary> maps = file.maps();
   const std::size_t changes = file.history().size();
   if (options.json) {

@@ -7,6 +7,7 @@
 #include "common/map_file/map_file.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
+#include "tests/map_file/map_fixture.hpp"
 
 using namespace understory;
 using namespace understory::test;
@@ -252,6 +253,28 @@ TEST_CASE_METHOD(Maps, "export as GeoJSON has every property of a landmark", "[c
   CHECK(one["properties"]["diameter_m"].is_null());
   CHECK(one["properties"]["covariance_m2"][0].size() == 2);
   CHECK(nlohmann::json::parse(read_text(out / "map-1" / "trajectory.geojson"))["features"].empty());
+}
+
+TEST_CASE_METHOD(Maps, "info leaves what a killed writer left as it is, and says so", "[cli]") {
+  fine("import " + table + " --out " + file);
+  in_child([&] {
+    MapFile writing(file, Access::kWrite);
+    writing.revert(0, note("killed behind it"));
+    ::_exit(0);
+    return 0;
+  });
+  const std::string log = file + "-wal";
+  const Bytes bytes = read_bytes(file);
+  const Bytes in_log = read_bytes(log);
+  const Outcome outcome = fine("info " + file);
+  CHECK_THAT(outcome.out, Contains(file + ": 0 maps, 2 changes"));
+  CHECK_THAT(outcome.error, Contains("maps.gpkg-wal lies beside it: a writer was killed"));
+  CHECK(lines(outcome.error) == 1);
+  CHECK((read_bytes(file) == bytes));
+  CHECK((read_bytes(log) == in_log));
+  fine("check " + file);
+  CHECK_FALSE(std::filesystem::exists(log));
+  CHECK(fine("info " + file).error.empty());
 }
 
 TEST_CASE_METHOD(Maps, "every part names a file that is no map", "[cli]") {
