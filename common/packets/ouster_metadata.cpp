@@ -20,12 +20,19 @@ constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 constexpr double kMetresPerMm = 1e-3;
 constexpr std::size_t kMostColumns = 4096;
 
-constexpr std::array<std::pair<std::string_view, OusterProfile>, 5> kProfiles{
-    {{"LEGACY", OusterProfile::kLegacy},
-     {"RNG19_RFL8_SIG16_NIR16", OusterProfile::kSingle},
-     {"RNG19_RFL8_SIG16_NIR16_DUAL", OusterProfile::kDual},
-     {"RNG15_RFL8_NIR8", OusterProfile::kLowDataRate},
-     {"FUSA_RNG15_RFL8_NIR8_DUAL", OusterProfile::kSafetyDual}}};
+/// ouster-sdk, `parsing.cpp`: `profiles`.
+constexpr std::array<OusterProfile, 10> kProfiles{{
+    {"LEGACY", OusterPixel::kLegacy, 12},
+    {"RNG19_RFL8_SIG16_NIR16", OusterPixel::kSingle, 12},
+    {"RNG19_RFL8_SIG16_NIR16_DUAL", OusterPixel::kDual, 16},
+    {"RNG15_RFL8_NIR8", OusterPixel::kLowDataRate, 4},
+    {"RNG15_RFL8_NIR8_DUAL", OusterPixel::kLowDataRateDual, 8},
+    {"FUSA_RNG15_RFL8_NIR8_DUAL", OusterPixel::kLowDataRateDual, 8, true},
+    {"FIVE_WORD_PIXEL", OusterPixel::kDual, 20},
+    {"RNG15_RFL8_WIN8", OusterPixel::kLowDataRate, 4},
+    {"RNG15_RFL8_NIR8_ZONE16", OusterPixel::kLowDataRate, 8},
+    {"RNG19_RFL8_SIG16_NIR16_ZONE16", OusterPixel::kSingle, 12},
+}};
 
 constexpr std::array<std::pair<std::string_view, OusterTimeMode>, 3> kTimeModes{
     {{"TIME_FROM_INTERNAL_OSC", OusterTimeMode::kInternal},
@@ -188,7 +195,14 @@ void read_product(const Fields& fields, OusterMetadata& metadata) {
 void read_format(const Fields& fields, OusterMetadata& metadata) {
   std::string profile = fields.text("lidar_data_format", "udp_profile_lidar");
   if (profile.empty()) profile = fields.text("config_params", "udp_profile_lidar");
-  if (!profile.empty()) metadata.profile = named(fields, "udp_profile_lidar", profile, kProfiles);
+  if (profile.empty()) profile = "LEGACY";
+  const auto known = ouster_profile(profile);
+  if (!known) fields.fail("udp_profile_lidar", "\"" + profile + "\" is not known");
+  metadata.profile = *known;
+  // Since firmware 3.2 the header is chosen apart from the pixels.
+  if (fields.text("lidar_data_format", "header_type") == "FUSA" &&
+      known->pixel != OusterPixel::kLegacy)
+    metadata.profile.has_safety_header = true;
 
   auto columns = fields.number("lidar_data_format", "columns_per_frame");
   if (!columns) columns = columns_of_mode(fields.text("config_params", "lidar_mode"));
@@ -232,8 +246,11 @@ void read_geometry(const Fields& fields, OusterMetadata& metadata) {
 
 }  // namespace
 
-std::string_view to_string(OusterProfile profile) {
-  return std::ranges::find(kProfiles, profile, [](const auto& p) { return p.second; })->first;
+std::span<const OusterProfile> ouster_profiles() { return kProfiles; }
+
+std::optional<OusterProfile> ouster_profile(std::string_view name) {
+  const auto found = std::ranges::find(kProfiles, name, &OusterProfile::name);
+  return found == kProfiles.end() ? std::nullopt : std::optional(*found);
 }
 
 std::string_view to_string(OusterTimeMode mode) {

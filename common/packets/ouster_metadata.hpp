@@ -4,22 +4,35 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace understory::packets {
 
-/// Layouts of lidar packets (Ouster firmware manual, "Lidar Data Packet Format").
-enum class OusterProfile : std::uint8_t {
+/// Where range and reflectivity of a pixel lie (Ouster firmware manual, "Lidar Data Packet
+/// Format").
+enum class OusterPixel : std::uint8_t {
   kLegacy,
-  kSingle,       ///< RNG19_RFL8_SIG16_NIR16
-  kDual,         ///< RNG19_RFL8_SIG16_NIR16_DUAL
-  kLowDataRate,  ///< RNG15_RFL8_NIR8
-  kSafetyDual,   ///< FUSA_RNG15_RFL8_NIR8_DUAL
+  kSingle,           ///< Range 19 bits, one return.
+  kDual,             ///< Range 19 bits, two returns.
+  kLowDataRate,      ///< Range 15 bits of 8 mm, one return.
+  kLowDataRateDual,  ///< The same, two returns.
 };
-/// As the metadata names it ("LEGACY", "RNG19_RFL8_SIG16_NIR16" and so on).
-std::string_view to_string(OusterProfile profile);
+
+/// A layout of lidar packets: `udp_profile_lidar`.
+struct OusterProfile {
+  std::string_view name;
+  OusterPixel pixel = OusterPixel::kLegacy;
+  std::size_t pixel_bytes = 12;
+  bool has_safety_header = false;  ///< The frame's number has 32 bits, elsewhere in the header.
+};
+/// All that are read: LEGACY, RNG19_RFL8_SIG16_NIR16, RNG19_RFL8_SIG16_NIR16_DUAL, RNG15_RFL8_NIR8,
+/// RNG15_RFL8_NIR8_DUAL, FUSA_RNG15_RFL8_NIR8_DUAL, and those with zones, windows and five words.
+std::span<const OusterProfile> ouster_profiles();
+/// By its name; none for another.
+std::optional<OusterProfile> ouster_profile(std::string_view name);
 
 /// Whose time the packets have: `timestamp_mode`.
 enum class OusterTimeMode : std::uint8_t {
@@ -35,7 +48,7 @@ std::string_view to_string(OusterTimeMode mode);
 struct OusterMetadata {
   std::string product_line;  ///< "OS-1-64"; empty = not told.
   std::string serial_number;
-  OusterProfile profile = OusterProfile::kLegacy;
+  OusterProfile profile = {"LEGACY"};
   OusterTimeMode time_mode = OusterTimeMode::kUnknown;
   std::size_t columns_per_frame = 1024;
   std::size_t columns_per_packet = 16;

@@ -16,6 +16,9 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr double kStandardGravity_mps2 = 9.80665;
 constexpr double kFullTurn_rad = 2.0 * std::numbers::pi;
+constexpr std::size_t kImuBlockAt = 132;
+constexpr std::size_t kImuSample = 36;
+constexpr std::size_t kImuFooter = 32;
 constexpr std::int64_t kLongestPacket_ns = 1'000'000'000;
 
 /// Ranges by the data sheets (OS0, OS1, OS2, OSDome; Rev7, 80 % reflectivity and more).
@@ -26,6 +29,12 @@ double usual_range_m(std::string_view product_line) {
   return 250.0;
 }
 
+/// x, y, z as float32.
+Eigen::Vector3d vector_at(Bytes bytes, std::size_t at) {
+  return {number_at<float>(bytes, at), number_at<float>(bytes, at + 4),
+          number_at<float>(bytes, at + 8)};
+}
+
 /// One return of one beam.
 struct Return {
   std::uint32_t range_mm = 0;
@@ -33,49 +42,54 @@ struct Return {
 };
 
 /// `parsing.cpp`, *_field_info: where range and reflectivity lie, masks and units.
-Return first_return(Bytes pixel, OusterProfile profile) {
+Return first_return(Bytes pixel, OusterPixel pixel_kind) {
   constexpr std::uint32_t kLegacyRange = 0xFFFFF;
   constexpr std::uint32_t kRange = 0x7FFFF;
   constexpr std::uint32_t kShortRange = 0x7FFF;  // in units of 8 mm
   const auto word = number_at<std::uint32_t>(pixel, 0);
-  switch (profile) {
-    case OusterProfile::kLegacy:
+  switch (pixel_kind) {
+    case OusterPixel::kLegacy:
       return {word & kLegacyRange,
               static_cast<std::uint8_t>(std::min<int>(number_at<std::uint16_t>(pixel, 4), 255))};
-    case OusterProfile::kSingle:
+    case OusterPixel::kSingle:
       return {word & kRange, pixel[4]};
-    case OusterProfile::kDual:
+    case OusterPixel::kDual:
       return {word & kRange, pixel[3]};
-    case OusterProfile::kLowDataRate:
-    case OusterProfile::kSafetyDual:
+    case OusterPixel::kLowDataRate:
+    case OusterPixel::kLowDataRateDual:
       return {(word & kShortRange) * 8, pixel[2]};
   }
   return {};
 }
 
-Return second_return(Bytes pixel, OusterProfile profile) {
-  if (profile == OusterProfile::kDual)
+Return second_return(Bytes pixel, OusterPixel pixel_kind) {
+  if (pixel_kind == OusterPixel::kDual)
     return {number_at<std::uint32_t>(pixel, 4) & 0x7FFFFU, pixel[7]};
-  if (profile == OusterProfile::kSafetyDual)
+  if (pixel_kind == OusterPixel::kLowDataRateDual)
     return {(number_at<std::uint32_t>(pixel, 4) & 0x7FFFU) * 8, pixel[6]};
   return {};
 }
 
 }  // namespace
 
-OusterFormat ouster_format(OusterProfile profile, std::size_t beams,
+OusterFormat ouster_format(const OusterProfile& profile, std::size_t beams,
                            std::size_t columns_per_packet) {
-  constexpr std::array<std::size_t, 5> kPixelBytes{12, 12, 16, 4, 8};
-  const bool is_legacy = profile == OusterProfile::kLegacy;
+  const bool is_legacy = profile.pixel == OusterPixel::kLegacy;
   OusterFormat format;
   format.packet_header = is_legacy ? 0 : 32;
   format.column_header = is_legacy ? 16 : 12;
-  format.pixel = kPixelBytes[static_cast<std::size_t>(profile)];
+  format.pixel = profile.pixel_bytes;
   const std::size_t column_footer = is_legacy ? 4 : 0;
   const std::size_t packet_footer = is_legacy ? 0 : 32;
   format.column = format.column_header + beams * format.pixel + column_footer;
   format.packet = format.packet_header + columns_per_packet * format.column + packet_footer;
   return format;
+}
+
+bool is_ouster_imu_block(Bytes bytes) {
+  constexpr std::uint8_t kImuPacket = 2;
+  return bytes.size() > kImuBlockAt + kImuFooter && bytes[0] == kImuPacket &&
+         (bytes.size() - kImuBlockAt - kImuFooter) % kImuSample == 0;
 }
 
 /// The header of a column.
@@ -107,14 +121,9 @@ OusterStream::OusterStream(OusterMetadata metadata, double max_range_m)
 }
 
 std::uint32_t OusterStream::frame_id(Bytes bytes) const {
-  switch (metadata_.profile) {
-    case OusterProfile::kLegacy:
-      return number_at<std::uint16_t>(bytes, 10);
-    case OusterProfile::kSafetyDual:
-      return number_at<std::uint32_t>(bytes, 4);
-    default:
-      return number_at<std::uint16_t>(bytes, 2);
-  }
+  if (metadata_.profile.pixel == OusterPixel::kLegacy) return number_at<std::uint16_t>(bytes, 10);
+  if (metadata_.profile.has_safety_header) return number_at<std::uint32_t>(bytes, 4);
+  return number_at<std::uint16_t>(bytes, 2);
 }
 
 OusterStream::Column OusterStream::column_at(Bytes bytes, std::size_t number) const {
@@ -122,7 +131,7 @@ OusterStream::Column OusterStream::column_at(Bytes bytes, std::size_t number) co
   column.at = format_.packet_header + number * format_.column;
   column.time_ns = number_at<std::int64_t>(bytes, column.at);
   column.id = number_at<std::uint16_t>(bytes, column.at + 8);
-  if (metadata_.profile == OusterProfile::kLegacy) {
+  if (metadata_.profile.pixel == OusterPixel::kLegacy) {
     column.is_valid = number_at<std::uint32_t>(bytes, column.at + format_.column - 4) == 0xFFFFFFFF;
   } else {
     column.is_valid = (number_at<std::uint16_t>(bytes, column.at + 10) & 1U) != 0;
@@ -133,7 +142,7 @@ OusterStream::Column OusterStream::column_at(Bytes bytes, std::size_t number) co
 std::optional<Fault> OusterStream::check(Bytes bytes) const {
   constexpr std::uint8_t kLidarPacket = 1;
   if (bytes.size() != format_.packet) return Fault::kWrongSize;
-  if (metadata_.profile != OusterProfile::kLegacy && bytes[0] != kLidarPacket)
+  if (metadata_.profile.pixel != OusterPixel::kLegacy && bytes[0] != kLidarPacket)
     return Fault::kOtherModel;
 
   std::optional<std::int64_t> first_ns;
@@ -153,7 +162,9 @@ Readings OusterStream::add(const Packet& packet) {
   Readings readings;
   ++counts_.packets;
   if (packet.bytes.size() == kOusterImuBytes) {
-    add_imu(packet, readings);
+    add_imu_packet(packet, readings);
+  } else if (packet.bytes.size() != format_.packet && is_ouster_imu_block(packet.bytes)) {
+    add_imu_block(packet, readings);
   } else if (const auto fault = check(packet.bytes)) {
     readings.fault = fault;
   } else {
@@ -243,40 +254,57 @@ void OusterStream::add_column(Bytes bytes, const Column& column) {
                    reading.reflectivity);
     };
 
-    const Return first = first_return(pixel, metadata_.profile);
-    const Return second = second_return(pixel, metadata_.profile);
+    const Return first = first_return(pixel, metadata_.profile.pixel);
+    const Return second = second_return(pixel, metadata_.profile.pixel);
     add_return(first);
     if (second.range_mm != first.range_mm) add_return(second);
   }
 }
 
-void OusterStream::add_imu(const Packet& packet, Readings& readings) {
-  constexpr std::size_t kAccelerationTimeAt = 8;
-  constexpr std::size_t kAccelerationAt = 24;  // x, y, z [g]
-  constexpr std::size_t kRateAt = 36;          // x, y, z [degrees per second]
-  constexpr double kMost = 1e4;
-  const auto time_ns = number_at<std::int64_t>(packet.bytes, kAccelerationTimeAt);
-  Eigen::Vector3d acceleration_g;
-  Eigen::Vector3d rate_deg_s;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto at = static_cast<std::size_t>(4 * axis);
-    acceleration_g[axis] = number_at<float>(packet.bytes, kAccelerationAt + at);
-    rate_deg_s[axis] = number_at<float>(packet.bytes, kRateAt + at);
-  }
+/// One sample, in the IMU's axes.
+struct OusterStream::ImuReading {
+  std::int64_t time_ns = 0;
+  Eigen::Vector3d acceleration_mps2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rate_rad_s = Eigen::Vector3d::Zero();
+};
 
-  if (time_ns < 0 || time_ns > SensorClock::kLatest_ns || !(acceleration_g.norm() < kMost) ||
-      !(rate_deg_s.norm() < kMost)) {
+/// Profile LEGACY: three times, then g and degrees per second.
+void OusterStream::add_imu_packet(const Packet& packet, Readings& readings) {
+  constexpr std::size_t kAccelerationTimeAt = 8;
+  const ImuReading reading{number_at<std::int64_t>(packet.bytes, kAccelerationTimeAt),
+                           kStandardGravity_mps2 * vector_at(packet.bytes, 24),
+                           std::numbers::pi / 180.0 * vector_at(packet.bytes, 36)};
+  add_sample(reading, packet.received, readings);
+}
+
+/// Profile ACCEL32_GYRO32_NMEA: samples with a header like a column's, in SI units (`packet.cpp`,
+/// ImuPacket::accel()).
+void OusterStream::add_imu_block(const Packet& packet, Readings& readings) {
+  for (std::size_t at = kImuBlockAt; at + kImuFooter < packet.bytes.size(); at += kImuSample) {
+    const bool is_valid = (number_at<std::uint16_t>(packet.bytes, at + 10) & 1U) != 0;
+    if (!is_valid) continue;
+    add_sample({number_at<std::int64_t>(packet.bytes, at), vector_at(packet.bytes, at + 12),
+                vector_at(packet.bytes, at + 24)},
+               packet.received, readings);
+  }
+}
+
+void OusterStream::add_sample(const ImuReading& reading, model::Utime received,
+                              Readings& readings) {
+  constexpr double kMost = 1e4;
+  if (reading.time_ns < 0 || reading.time_ns > SensorClock::kLatest_ns ||
+      !(reading.acceleration_mps2.norm() < kMost) || !(reading.rate_rad_s.norm() < kMost)) {
     readings.fault = Fault::kDamaged;
     return;
   }
-  take_time(time_ns, packet.received);
+  take_time(reading.time_ns, received);
 
   const Eigen::Matrix3d sensor_R_imu = metadata_.sensor_T_imu.linear();
   model::ImuSample sample;
-  sample.utime = clock_.placed_ns(time_ns) / 1000;
+  sample.utime = clock_.placed_ns(reading.time_ns) / 1000;
   sample.sequence = imu_samples_++;
-  sample.specific_force_mps2 = sensor_R_imu * (kStandardGravity_mps2 * acceleration_g);
-  sample.angular_rate_rad_s = sensor_R_imu * (std::numbers::pi / 180.0 * rate_deg_s);
+  sample.specific_force_mps2 = sensor_R_imu * reading.acceleration_mps2;
+  sample.angular_rate_rad_s = sensor_R_imu * reading.rate_rad_s;
   readings.imu.push_back(sample);
 }
 

@@ -31,8 +31,11 @@ struct OusterFormat {
   std::size_t packet = 0;
 };
 /// Of the packets that a sensor with these metadata sends.
-OusterFormat ouster_format(OusterProfile profile, std::size_t beams,
+OusterFormat ouster_format(const OusterProfile& profile, std::size_t beams,
                            std::size_t columns_per_packet);
+/// Whether these bytes are an IMU packet of profile ACCEL32_GYRO32_NMEA (firmware 3.2 and later): a
+/// header of 32 bytes, 100 of NMEA, samples of 36 each, a footer of 32.
+bool is_ouster_imu_block(std::span<const std::uint8_t> bytes);
 
 /// Lidar and IMU packets in, frames and IMU samples out, in the sensor's frame (x away from the
 /// connector, z up). Dual returns give both points, unless they are the same.
@@ -60,7 +63,10 @@ class OusterStream {
   Column column_at(std::span<const std::uint8_t> bytes, std::size_t number) const;
   std::uint32_t frame_id(std::span<const std::uint8_t> bytes) const;
   void add_lidar(const Packet& packet, Readings& readings);
-  void add_imu(const Packet& packet, Readings& readings);
+  struct ImuReading;
+  void add_imu_packet(const Packet& packet, Readings& readings);
+  void add_imu_block(const Packet& packet, Readings& readings);
+  void add_sample(const ImuReading& reading, model::Utime received, Readings& readings);
   void add_column(std::span<const std::uint8_t> bytes, const Column& column);
   void take_time(std::int64_t time_ns, model::Utime received);
   void end_frame(std::vector<model::PointSweep>& sweeps);

@@ -42,16 +42,15 @@ std::optional<Recognised> recognise_ouster(Payload bytes, std::uint16_t port) {
   constexpr std::uint8_t kLidar = 1;
   if (bytes.size() == kOusterImuBytes && port == kOusterImuPort)
     return Recognised{Kind::kImu, "ouster", "Ouster IMU packet"};
-  constexpr std::array kProfiles{OusterProfile::kLegacy, OusterProfile::kSingle,
-                                 OusterProfile::kDual, OusterProfile::kLowDataRate,
-                                 OusterProfile::kSafetyDual};
+  if (is_ouster_imu_block(bytes) && port == kOusterImuPort)
+    return Recognised{Kind::kImu, "ouster", "Ouster IMU packet, ACCEL32_GYRO32_NMEA"};
   std::string fits;
-  for (const OusterProfile profile : kProfiles) {
-    const bool is_legacy = profile == OusterProfile::kLegacy;
+  for (const OusterProfile& profile : ouster_profiles()) {
+    const bool is_legacy = profile.pixel == OusterPixel::kLegacy;
     for (const std::size_t beams : {16U, 32U, 64U, 128U}) {
       if (bytes.size() != ouster_format(profile, beams, 16).packet) continue;
       if (!is_legacy && bytes[0] != kLidar) continue;
-      fits += fmt::format("{}{} beams {}", fits.empty() ? "" : " or ", beams, to_string(profile));
+      fits += fmt::format("{}{} beams {}", fits.empty() ? "" : " or ", beams, profile.name);
     }
   }
   if (!fits.empty()) return Recognised{Kind::kPoints, "ouster", "Ouster lidar packet, " + fits};

@@ -10,7 +10,6 @@ namespace understory::test {
 namespace {
 
 using packets::OusterMetadata;
-using packets::OusterProfile;
 
 constexpr double kDeg = std::numbers::pi / 180.0;
 
@@ -41,60 +40,44 @@ struct Pixel {
   std::uint8_t reflectivity = 0;
 };
 
-Pixel random_pixel(OusterProfile profile, std::mt19937_64& random) {
+/// What a profile's name says: bits of the range, returns.
+bool is_coarse(const std::string& profile) { return profile.find("RNG15") != std::string::npos; }
+bool has_two_returns(const std::string& profile) {
+  return profile.ends_with("DUAL") || profile == "FIVE_WORD_PIXEL";
+}
+
+Pixel random_pixel(const std::string& profile, std::mt19937_64& random) {
   if (random() % 10 == 0) return {};
-  const bool is_coarse =
-      profile == OusterProfile::kLowDataRate || profile == OusterProfile::kSafetyDual;
   const auto range = static_cast<std::uint32_t>(uniform(600.0, 60'000.0, random));
-  return {is_coarse ? range / 8 * 8 : range, static_cast<std::uint8_t>(random())};
+  return {is_coarse(profile) ? range / 8 * 8 : range, static_cast<std::uint8_t>(random())};
 }
 
-bool has_two_returns(OusterProfile profile) {
-  return profile == OusterProfile::kDual || profile == OusterProfile::kSafetyDual;
+std::size_t bytes_of_pixel(const std::string& profile) {
+  if (profile == "FIVE_WORD_PIXEL") return 20;
+  if (profile == "RNG15_RFL8_NIR8" || profile == "RNG15_RFL8_WIN8") return 4;
+  if (is_coarse(profile)) return 8;
+  return profile == "RNG19_RFL8_SIG16_NIR16_DUAL" ? 16 : 12;
 }
 
-std::size_t pixel_bytes(OusterProfile profile) {
-  switch (profile) {
-    case OusterProfile::kLegacy:
-    case OusterProfile::kSingle:
-      return 12;
-    case OusterProfile::kDual:
-      return 16;
-    case OusterProfile::kLowDataRate:
-      return 4;
-    case OusterProfile::kSafetyDual:
-      return 8;
-  }
-  return 0;
-}
-
-void put_pixel(ByteWriter& packet, std::size_t at, OusterProfile profile, const Pixel& first,
+void put_pixel(ByteWriter& packet, std::size_t at, const std::string& profile, const Pixel& first,
                const Pixel& second) {
-  switch (profile) {
-    case OusterProfile::kLegacy:
-      packet.put_bits(at, first.range_mm, 0xFFFFF);
-      packet.put<std::uint16_t>(at + 4, first.reflectivity);
-      break;
-    case OusterProfile::kSingle:
-      packet.put_bits(at, first.range_mm, 0x7FFFF);
-      packet.put(at + 4, first.reflectivity);
-      break;
-    case OusterProfile::kDual:
-      packet.put_bits(at, first.range_mm, 0x7FFFF);
-      packet.put(at + 3, first.reflectivity);
-      packet.put_bits(at + 4, second.range_mm, 0x7FFFF);
-      packet.put(at + 7, second.reflectivity);
-      break;
-    case OusterProfile::kLowDataRate:
-      packet.put_bits(at, first.range_mm / 8, 0x7FFF);
-      packet.put(at + 2, first.reflectivity);
-      break;
-    case OusterProfile::kSafetyDual:
-      packet.put_bits(at, first.range_mm / 8, 0x7FFF);
-      packet.put(at + 2, first.reflectivity);
-      packet.put_bits(at + 4, second.range_mm / 8, 0x7FFF);
-      packet.put(at + 6, second.reflectivity);
-      break;
+  if (is_coarse(profile)) {
+    packet.put_bits(at, first.range_mm / 8, 0x7FFF);
+    packet.put(at + 2, first.reflectivity);
+    if (!has_two_returns(profile)) return;
+    packet.put_bits(at + 4, second.range_mm / 8, 0x7FFF);
+    packet.put(at + 6, second.reflectivity);
+  } else if (has_two_returns(profile)) {
+    packet.put_bits(at, first.range_mm, 0x7FFFF);
+    packet.put(at + 3, first.reflectivity);
+    packet.put_bits(at + 4, second.range_mm, 0x7FFFF);
+    packet.put(at + 7, second.reflectivity);
+  } else if (profile == "LEGACY") {
+    packet.put_bits(at, first.range_mm, 0xFFFFF);
+    packet.put<std::uint16_t>(at + 4, first.reflectivity);
+  } else {
+    packet.put_bits(at, first.range_mm, 0x7FFFF);
+    packet.put(at + 4, first.reflectivity);
   }
 }
 
@@ -102,7 +85,7 @@ void put_pixel(ByteWriter& packet, std::size_t at, OusterProfile profile, const 
 class OusterMaker {
  public:
   OusterMaker(const OusterMetadata& metadata, std::mt19937_64& random)
-      : metadata_(metadata), random_(random) {}
+      : metadata_(metadata), profile_(metadata.profile.name), random_(random) {}
 
   MadeUpRecording record(int sweeps, model::Utime start) {
     // A frame of which the begin is missing, whole ones, and the first packet of another.
@@ -135,12 +118,12 @@ class OusterMaker {
   }
 
   void add_packet(std::size_t number, std::vector<TruePoint>& points, MadeUpRecording& recording) {
-    const bool is_legacy = metadata_.profile == OusterProfile::kLegacy;
+    const bool is_legacy = profile_ == "LEGACY";
     const std::size_t column_bytes =
-        (is_legacy ? 20 : 12) + metadata_.beams() * pixel_bytes(metadata_.profile);
+        (is_legacy ? 20 : 12) + metadata_.beams() * bytes_of_pixel(profile_);
     const std::size_t columns = metadata_.columns_per_packet;
     ByteWriter packet((is_legacy ? 0 : 64) + columns * column_bytes, random_);
-    if (metadata_.profile == OusterProfile::kSafetyDual) {
+    if (metadata_.profile.has_safety_header) {
       packet.put<std::uint8_t>(0, 1);
       packet.put<std::uint32_t>(4, frame_);
     } else if (!is_legacy) {
@@ -174,13 +157,12 @@ class OusterMaker {
   void add_column(ByteWriter& packet, std::size_t at, std::size_t column, bool is_valid,
                   std::vector<TruePoint>& points) {
     for (std::size_t beam = 0; beam < metadata_.beams(); ++beam) {
-      const Pixel first = random_pixel(metadata_.profile, random_);
-      const Pixel second = random_() % 3 == 0 ? first : random_pixel(metadata_.profile, random_);
-      put_pixel(packet, at + beam * pixel_bytes(metadata_.profile), metadata_.profile, first,
-                second);
+      const Pixel first = random_pixel(profile_, random_);
+      const Pixel second = random_() % 3 == 0 ? first : random_pixel(profile_, random_);
+      put_pixel(packet, at + beam * bytes_of_pixel(profile_), profile_, first, second);
       if (!is_valid) continue;
       add_point(beam, column, first, points);
-      if (has_two_returns(metadata_.profile) && second.range_mm != first.range_mm)
+      if (has_two_returns(profile_) && second.range_mm != first.range_mm)
         add_point(beam, column, second, points);
     }
   }
@@ -206,27 +188,61 @@ class OusterMaker {
     points.push_back({metadata_.sensor_T_lidar * in_lidar, time_ns_, ring, pixel.reflectivity});
   }
 
-  void add_imu(MadeUpRecording& recording) {
-    ByteWriter packet(packets::kOusterImuBytes, random_);
-    Eigen::Vector3f g;
-    Eigen::Vector3f deg_s;
+  model::ImuSample random_sample(std::int64_t time_ns, std::size_t sequence, Eigen::Vector3f& first,
+                                 Eigen::Vector3f& second, double first_unit, double second_unit) {
     for (int axis = 0; axis < 3; ++axis) {
-      g[axis] = static_cast<float>(uniform(-2.0, 2.0, random_));
-      deg_s[axis] = static_cast<float>(uniform(-90.0, 90.0, random_));
-      packet.put(24 + 4 * static_cast<std::size_t>(axis), g[axis]);
-      packet.put(36 + 4 * static_cast<std::size_t>(axis), deg_s[axis]);
+      first[axis] = static_cast<float>(uniform(-2.0, 2.0, random_));
+      second[axis] = static_cast<float>(uniform(-90.0, 90.0, random_));
     }
-    packet.put(8, time_ns_);
     model::ImuSample sample;
-    sample.utime = time_ns_ / 1000;
-    sample.sequence = recording.imu.size();
-    sample.specific_force_mps2 = metadata_.sensor_T_imu.linear() * g.cast<double>() * 9.80665;
-    sample.angular_rate_rad_s = metadata_.sensor_T_imu.linear() * deg_s.cast<double>() * kDeg;
-    recording.imu.push_back(sample);
+    sample.utime = time_ns / 1000;
+    sample.sequence = sequence;
+    const Eigen::Matrix3d rotation = metadata_.sensor_T_imu.linear();
+    sample.specific_force_mps2 = rotation * first.cast<double>() * first_unit;
+    sample.angular_rate_rad_s = rotation * second.cast<double>() * second_unit;
+    return sample;
+  }
+
+  static void put_vectors(ByteWriter& packet, std::size_t at, const Eigen::Vector3f& first,
+                          const Eigen::Vector3f& second) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      packet.put(at + 4 * axis, first[static_cast<int>(axis)]);
+      packet.put(at + 12 + 4 * axis, second[static_cast<int>(axis)]);
+    }
+  }
+
+  /// Firmware before 3.2: one sample in g and degrees. Later: eight in SI units, some not valid.
+  void add_imu(MadeUpRecording& recording) {
+    Eigen::Vector3f first;
+    Eigen::Vector3f second;
+    if (profile_ != "RNG15_RFL8_NIR8_DUAL") {
+      ByteWriter packet(48, random_);
+      recording.imu.push_back(
+          random_sample(time_ns_, recording.imu.size(), first, second, 9.80665, kDeg));
+      put_vectors(packet, 24, first, second);
+      packet.put(8, time_ns_);
+      recording.packets.push_back({packet.take(), time_ns_ / 1000, 7503});
+      return;
+    }
+
+    constexpr std::size_t kSamples = 8;
+    ByteWriter packet(32 + 100 + kSamples * 36 + 32, random_);
+    packet.put<std::uint16_t>(0, 2);
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      const std::size_t at = 132 + 36 * i;
+      const bool is_valid = random_() % 5 != 0;
+      const std::int64_t sample_ns = time_ns_ + 1000 * static_cast<std::int64_t>(i);
+      const auto sample = random_sample(sample_ns, recording.imu.size(), first, second, 1.0, 1.0);
+      put_vectors(packet, at + 12, first, second);
+      packet.put(at, sample_ns);
+      packet.put<std::uint16_t>(at + 10, is_valid ? 1 : 0);
+      if (is_valid) recording.imu.push_back(sample);
+    }
     recording.packets.push_back({packet.take(), time_ns_ / 1000, 7503});
   }
 
   OusterMetadata metadata_;
+  std::string profile_;
   std::mt19937_64& random_;
   std::uint32_t frame_ = 0;
   std::int64_t column_ns_ = 0;
@@ -246,7 +262,7 @@ MadeUpSensor made_up_ouster(const OusterMetadata& metadata, bool is_nested) {
   MadeUpSensor sensor;
   sensor.name = std::string("ouster ") + std::to_string(metadata.beams()) + " beams " +
                 std::to_string(metadata.columns_per_frame) + " columns " +
-                std::string(to_string(metadata.profile)) + (is_nested ? "" : " flat");
+                std::string(metadata.profile.name) + (is_nested ? "" : " flat");
   sensor.description.model = "ouster";
   sensor.description.description = ouster_json(metadata, is_nested);
   sensor.description.source = "os.json";
@@ -259,12 +275,12 @@ MadeUpSensor made_up_ouster(const OusterMetadata& metadata, bool is_nested) {
 
 }  // namespace
 
-packets::OusterMetadata random_ouster(OusterProfile profile, std::size_t beams, std::size_t columns,
-                                      std::mt19937_64& random) {
+packets::OusterMetadata random_ouster(const std::string& profile, std::size_t beams,
+                                      std::size_t columns, std::mt19937_64& random) {
   OusterMetadata metadata;
   metadata.product_line = "OS-1-" + std::to_string(beams);
   metadata.serial_number = "122150000000";
-  metadata.profile = profile;
+  metadata.profile = packets::ouster_profile(profile).value();
   metadata.time_mode = packets::OusterTimeMode::kPtp;
   metadata.columns_per_frame = columns;
   metadata.last_column = columns - 1;
@@ -284,8 +300,10 @@ std::string ouster_json(const OusterMetadata& metadata, bool is_nested) {
                            {"columns_per_packet", metadata.columns_per_packet},
                            {"pixels_per_column", metadata.beams()},
                            {"column_window", {metadata.first_column, metadata.last_column}},
-                           {"udp_profile_lidar", to_string(metadata.profile)},
+                           {"udp_profile_lidar", metadata.profile.name},
                            {"udp_profile_imu", "LEGACY"}};
+  if (!metadata.profile.name.starts_with("FUSA") && metadata.profile.has_safety_header)
+    format["header_type"] = "FUSA";
   nlohmann::json beams = {
       {"beam_altitude_angles", in_degrees(metadata.altitude_rad)},
       {"beam_azimuth_angles", in_degrees(metadata.azimuth_rad)},
@@ -321,23 +339,31 @@ std::string ouster_json(const OusterMetadata& metadata, bool is_nested) {
 std::vector<MadeUpSensor> made_up_ousters() {
   std::mt19937_64 random(11);
   std::vector<MadeUpSensor> sensors;
-  const auto add = [&](OusterProfile profile, std::size_t beams, std::size_t columns,
-                       std::size_t first, std::size_t last) {
+  const auto add = [&](const std::string& profile, std::size_t beams, std::size_t columns,
+                       std::size_t first, std::size_t last, bool has_safety_header = false) {
     OusterMetadata metadata = random_ouster(profile, beams, columns, random);
     metadata.first_column = first;
     metadata.last_column = last;
-    sensors.push_back(made_up_ouster(metadata, sensors.size() % 2 == 0));
+    if (has_safety_header) metadata.profile.has_safety_header = true;
+    sensors.push_back(made_up_ouster(metadata, sensors.size() % 2 == 0 || has_safety_header));
   };
-  add(OusterProfile::kLegacy, 16, 512, 0, 511);
-  add(OusterProfile::kSingle, 32, 512, 0, 511);
-  add(OusterProfile::kDual, 64, 512, 0, 511);
-  add(OusterProfile::kLowDataRate, 128, 512, 0, 511);
-  add(OusterProfile::kSafetyDual, 32, 512, 0, 511);
-  add(OusterProfile::kLegacy, 64, 1024, 0, 1023);
-  add(OusterProfile::kSingle, 16, 2048, 0, 2047);
+  add("LEGACY", 16, 512, 0, 511);
+  add("RNG19_RFL8_SIG16_NIR16", 32, 512, 0, 511);
+  add("RNG19_RFL8_SIG16_NIR16_DUAL", 64, 512, 0, 511);
+  add("RNG15_RFL8_NIR8", 128, 512, 0, 511);
+  add("FUSA_RNG15_RFL8_NIR8_DUAL", 32, 512, 0, 511);
+  add("LEGACY", 64, 1024, 0, 1023);
+  add("RNG19_RFL8_SIG16_NIR16", 16, 2048, 0, 2047);
+  // Firmware 3.2: more profiles, headers apart from them.
+  add("RNG15_RFL8_NIR8_DUAL", 64, 512, 0, 511);
+  add("RNG19_RFL8_SIG16_NIR16", 32, 512, 0, 511, true);
+  add("RNG15_RFL8_NIR8_ZONE16", 16, 512, 0, 511);
+  add("RNG19_RFL8_SIG16_NIR16_ZONE16", 16, 512, 0, 511);
+  add("RNG15_RFL8_WIN8", 32, 512, 0, 511);
+  add("FIVE_WORD_PIXEL", 16, 512, 0, 511);
   // Azimuth windows: within, and through column 0.
-  add(OusterProfile::kSingle, 16, 1024, 100, 700);
-  add(OusterProfile::kDual, 16, 1024, 900, 150);
+  add("RNG19_RFL8_SIG16_NIR16", 16, 1024, 100, 700);
+  add("RNG19_RFL8_SIG16_NIR16_DUAL", 16, 1024, 900, 150);
   return sensors;
 }
 

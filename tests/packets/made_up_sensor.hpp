@@ -58,7 +58,7 @@ std::vector<MadeUpSensor> one_of_each_family();
 /// An Ouster's metadata. `is_nested`: the layout of firmware 2.4 and later, else the flat one.
 std::string ouster_json(const packets::OusterMetadata& metadata, bool is_nested);
 /// Metadata of random geometry.
-packets::OusterMetadata random_ouster(packets::OusterProfile profile, std::size_t beams,
+packets::OusterMetadata random_ouster(const std::string& profile, std::size_t beams,
                                       std::size_t columns, std::mt19937_64& random);
 
 }  // namespace understory::test

@@ -149,6 +149,7 @@ TEST_CASE("damaged packets are refused or decoded, never more", "[packets]") {
   for (const MadeUpSensor& sensor : made_up_sensors()) {
     CAPTURE(sensor.name);
     const MadeUpRecording recording = sensor.record(1, kStart, random);
+    std::uint64_t refused = 0;
     for (int trial = 0; trial < 20; ++trial) {
       auto packets = recording.packets;
       for (SentPacket& packet : packets) {
@@ -166,13 +167,14 @@ TEST_CASE("damaged packets are refused or decoded, never more", "[packets]") {
         }
       }
       const Decoded decoded = decode(sensor.description, packets);
-      CHECK(decoded.counts.refused > 0);
+      refused += decoded.counts.refused;
       for (const auto& sweep : decoded.sweeps) {
         REQUIRE(std::ranges::all_of(sweep.points, [&](const auto& point) {
           return point.position().allFinite() && point.time_s >= 0.0F && point.ring < sweep.rings;
         }));
       }
     }
+    CHECK(refused > 20);
   }
 }
 
@@ -254,7 +256,7 @@ TEST_CASE("packets are recognised as what they are", "[packets]") {
     noise.payload.resize(random() % 2000);
     for (auto& byte : noise.payload) byte = static_cast<std::uint8_t>(random());
     if (noise.payload.size() == 48 || noise.port == kOusterLidarPort) continue;
-    if (ouster_format(OusterProfile::kLegacy, 16, 16).packet == noise.payload.size()) continue;
+    if (ouster_format({"LEGACY"}, 16, 16).packet == noise.payload.size()) continue;
     REQUIRE(recognise(noise).kind == Kind::kUnknown);
   }
 }
