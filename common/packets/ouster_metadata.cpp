@@ -167,20 +167,12 @@ std::optional<double> columns_of_mode(const std::string& mode) {
   return static_cast<double>(columns);
 }
 
-template <class Value, std::size_t kSize>
-Value named(const Fields& fields, const char* what, const std::string& name,
-            const std::array<std::pair<std::string_view, Value>, kSize>& names) {
-  for (const auto& [known, value] : names) {
-    if (name == known) return value;
-  }
-  fields.fail(what, "\"" + name + "\" is not known");
-}
-
 void read_product(const Fields& fields, OusterMetadata& metadata) {
   metadata.product_line = fields.text("sensor_info", "prod_line");
   metadata.serial_number = fields.text("sensor_info", "prod_sn");
   const std::string mode = fields.text("config_params", "timestamp_mode");
-  if (!mode.empty()) metadata.time_mode = named(fields, "timestamp_mode", mode, kTimeModes);
+  const auto known = std::ranges::find(kTimeModes, mode, [](const auto& m) { return m.first; });
+  if (known != kTimeModes.end()) metadata.time_mode = known->second;
   const auto multiplier = fields.number("config_params", "signal_multiplier");
   metadata.signal_multiplier = multiplier.value_or(1.0);
   const auto port = [&](const char* name) -> std::optional<int> {

@@ -39,7 +39,7 @@ enum class OusterTimeMode : std::uint8_t {
   kInternal,   ///< TIME_FROM_INTERNAL_OSC: counts from power-on.
   kSyncPulse,  ///< TIME_FROM_SYNC_PULSE_IN: the time of day where the sensor gets NMEA, too.
   kPtp,        ///< TIME_FROM_PTP_1588: the master's, usually TAI.
-  kUnknown,    ///< Older metadata do not say.
+  kUnknown,    ///< Older metadata do not say, or something else.
 };
 /// As the metadata names it; "unknown".
 std::string_view to_string(OusterTimeMode mode);
