@@ -215,7 +215,8 @@ void check_same(const std::vector<model::PointSweep>& found,
     CHECK(found[i].utime == expected[i].utime);
     REQUIRE(found[i].points.size() == expected[i].points.size());
     for (std::size_t k = 0; k < found[i].points.size(); ++k) {
-      const auto apart = found[i].points[k].position() - expected[i].points[k].position();
+      const Eigen::Vector3f apart =
+          found[i].points[k].position() - expected[i].points[k].position();
       // The wire's steps.
       CHECK(apart.norm() < 0.02F);
       CHECK(found[i].points[k].ring == expected[i].points[k].ring);

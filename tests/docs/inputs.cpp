@@ -4,9 +4,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <random>
 
 #include "common/model/point_sweep.hpp"
 #include "tests/cli/simulated_bag.hpp"
+#include "tests/io/capture_file.hpp"
+#include "tests/packets/made_up_sensor.hpp"
 
 using namespace understory;
 using namespace understory::test;
@@ -33,6 +36,25 @@ void write_pcd(const std::filesystem::path& folder, const model::PointSweep& swe
   }
 }
 
+/// Two seconds of an Ouster, and its metadata beside it.
+void write_capture(const std::filesystem::path& folder) {
+  constexpr std::uint32_t kLaser = 0xC0A801C9;  // 192.168.1.201
+  constexpr int kSweeps = 20;
+  std::mt19937_64 random(3);
+  const MadeUpSensor sensor = made_up_ousters().front();
+  const MadeUpRecording recording = sensor.record(kSweeps, SimulatedBag::kStart_ns / 1000, random);
+  CaptureFile capture;
+  for (const SentPacket& packet : recording.packets)
+    capture.add(packet.sent + 200, kLaser, packet.port, packet.bytes);
+  const auto put = [&](const char* name, const auto& bytes) {
+    std::ofstream(folder / name, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+  };
+  put("laser.pcap", capture.bytes());
+  put("laser.json", sensor.description.description);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -53,5 +75,6 @@ int main(int argc, char** argv) {
     const auto sweep = part ? assembler.add(*part) : std::nullopt;
     if (sweep) write_pcd(folder / "clouds", *sweep);
   }
+  write_capture(folder);
   return 0;
 }
