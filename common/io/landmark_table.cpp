@@ -68,10 +68,12 @@ class LandmarkTable {
     model::MapLandmark& landmark = row.landmark;
     landmark.position_m = {coordinate(cells, LandmarkColumn::kX),
                            coordinate(cells, LandmarkColumn::kY)};
+
     const double sigma =
         within(cells, LandmarkColumn::kSigma, kLargestSigmaM).value_or(options_.sigma_m);
     if (sigma == 0.0) refuse("sigma_m is 0: every estimate has an error");
     landmark.covariance_m2 = sigma * sigma * Eigen::Matrix2d::Identity();
+
     const double diameter_m =
         within(cells, LandmarkColumn::kDiameter, kThickestTrunkM).value_or(0.0);
     landmark.radius_m = 0.5 * diameter_m;
@@ -115,6 +117,7 @@ class LandmarkTable {
                            most));
       return value;
     }
+
     if (std::abs(value) > kFarthestCoordinateM)
       refuse(fmt::format("{} {} is farther than 1e8 m from the origin", name_of(column), value));
     const bool is_far =

@@ -138,6 +138,7 @@ NamedPoints control_points_in(const std::string& file, const std::string& system
       const io::FoundColumn& found = *headings.at(column);
       return found.unit_m * number(found.place) / summary.unit;
     };
+
     const bool is_by_id = columns.id && !row.cells[*columns.id].empty();
     if (!is_by_id && !(columns.x && columns.y))
       throw io::DataError(fmt::format("{}, line {}: no landmark_id", file, row.line));

@@ -99,6 +99,7 @@ void export_results(const ExportOptions& options) {
   const bool has_places = std::ranges::find(options.formats, "geojson") != options.formats.end();
   std::optional<model::MapReference> reference;
   if (has_places) reference = frame_of_drive(options);
+
   const auto results = read_results(log);
   if (!results.map.map()) {
     fail(fmt::format("{}: neither a whole MAP nor the start of one in it (run replay first)", log));
@@ -166,6 +167,7 @@ void add_export_command(CLI::App& parent) {
   command
       ->add_option("--out", options->out, "Directory for the files; of mcap also a file NAME.mcap")
       ->required();
+
   command
       ->add_option(
           "--format", options->formats,

@@ -156,6 +156,7 @@ void add_map_georeference(CLI::App& map) {
                       "A table of points that are known in both: map_x_m,map_y_m (or landmark_id) "
                       "and easting,northing (or lat,lon) in the system --crs");
   command->add_option("--crs", options->crs, "Reference system of the control points: EPSG:25832");
+
   command->add_option("--fixes", options->fixes,
                       "The log of the drive that made the map: its fixes (RAW_GNSS with latitude "
                       "and longitude) at the times of keyframes");
@@ -168,6 +169,7 @@ void add_map_georeference(CLI::App& map) {
       ->check(CLI::Range(std::uint32_t{1}, map_file::kLastMapId));
   command->add_option("--like", options->like,
                       "A map file in whose frame the maps are, since their drive began with it");
+
   command
       ->add_option("--most-rms-m", options->most_rms_m,
                    "[m] Points that are farther off are refused (default: 1, fixes 10)")

@@ -121,6 +121,7 @@ void require_same_frame(const MapImportOptions& options, const KnownFile& known,
     wrong_usage("--crs and --same-frame: the table is in the one or in the other");
   if (known.reference && states_system && !options.table.origin.empty())
     wrong_usage(fmt::format("--origin: {} has one already", options.out));
+
   if (known.reference && !states_system && !options.same_frame)
     fail(fmt::format(
         "{}: is georeferenced ({}): {}--same-frame says that the coordinates in {} are "
@@ -173,6 +174,7 @@ void run_map_import(const MapImportOptions& options) {
   terminal::catch_interrupts();
   map_file::ChangeNote note =
       note_now("understory map import", fs::path(options.source()).filename().string(), "");
+
   if (fs::exists(options.out)) {
     map_file::MapFile file(options.out, map_file::Access::kWrite);
     const MapsToStore read = read_maps(options, note, {file.maps(), file.reference()});
