@@ -70,13 +70,12 @@ std::string projection_text(const FramePlace& place, double degrees_per_unit) {
         R"(PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",{:.16g}],)"
         R"(PARAMETER["central_meridian",{:.16g}])",
         angle(place.latitude_deg), angle(place.longitude_deg));
-  return fmt::format(
-      R"(PROJECTION["Hotine_Oblique_Mercator_Azimuth_Center"],)"
-      R"(PARAMETER["latitude_of_center",{:.16g}],)"
-      R"(PARAMETER["longitude_of_center",{:.16g}],PARAMETER["azimuth",{:.16g}],)"
-      R"(PARAMETER["rectified_grid_angle",{:.16g}])",
-      angle(place.latitude_deg), angle(place.longitude_deg), angle(kAzimuthDeg),
-      angle(kAzimuthDeg + place.rotation_rad / kPerDegree));
+  return fmt::format(R"(PROJECTION["Hotine_Oblique_Mercator_Azimuth_Center"],)"
+                     R"(PARAMETER["latitude_of_center",{:.16g}],)"
+                     R"(PARAMETER["longitude_of_center",{:.16g}],PARAMETER["azimuth",{:.16g}],)"
+                     R"(PARAMETER["rectified_grid_angle",{:.16g}])",
+                     angle(place.latitude_deg), angle(place.longitude_deg), angle(kAzimuthDeg),
+                     angle(kAzimuthDeg + place.rotation_rad / kPerDegree));
 }
 
 std::string definition_of_frame(PJ_CONTEXT* context, PJ* base, const FramePlace& place,

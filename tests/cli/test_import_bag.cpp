@@ -11,6 +11,7 @@
 #include "tests/cli/simulated_bag.hpp"
 #include "tests/io/velodyne_packets.hpp"
 #include "tests/packets/made_up_sensor.hpp"
+#include "understory/gnss_t.hpp"
 #include "understory/ground_truth_t.hpp"
 #include "understory/lidar_sweep_t.hpp"
 
@@ -81,6 +82,15 @@ TEST_CASE("import bag: every container gives what the sensors gave, byte for byt
       CHECK(channels.at(channel) == drive.log.at(channel));
     CHECK(channels.at("GROUND_TRUTH").size() > 100);
     CHECK(channels.at("RAW_GNSS").size() >= 7);
+    // `map georeference --fixes` places maps by these.
+    for (const wire::Bytes& bytes : channels.at("RAW_GNSS")) {
+      const auto fix = wire::decode_message<gnss_t>(bytes);
+      REQUIRE(fix);
+      CHECK(fix->has_geodetic != 0);
+      CHECK(fix->latitude_deg == Approx(48.0).margin(0.01));
+      CHECK(fix->longitude_deg == 9.0);
+      CHECK(fix->altitude_m == 500.0);
+    }
     if (first.empty()) first = file_bytes(log);
     CHECK(file_bytes(log) == first);
   }
