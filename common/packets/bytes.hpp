@@ -1,6 +1,7 @@
 // Numbers inside of packets: all makers send them with the least byte first.
 #pragma once
 
+#include <Eigen/Core>
 #include <bit>
 #include <concepts>
 #include <cstdint>
@@ -19,6 +20,15 @@ requires std::is_arithmetic_v<Number> Number number_at(std::span<const std::uint
   Number number;
   std::memcpy(&number, bytes.data() + at, sizeof(number));
   return number;
+}
+
+/// x, y, z, one behind the other.
+template <class Number>
+Eigen::Vector3d vector_at(std::span<const std::uint8_t> bytes, std::size_t at) {
+  const auto component = [&](std::size_t axis) {
+    return static_cast<double>(number_at<Number>(bytes, at + axis * sizeof(Number)));
+  };
+  return {component(0), component(1), component(2)};
 }
 
 }  // namespace understory::packets

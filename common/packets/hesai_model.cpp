@@ -198,6 +198,7 @@ std::vector<HesaiBeam> parse_hesai_angles(std::string_view text, HesaiModel mode
     throw io::DataError(
         fmt::format("{}: {} of {} channels are missing", source, missing, beams.size()));
   std::vector<HesaiBeam> result;
+  result.reserve(beams.size());
   for (const auto& beam : beams) result.push_back(*beam);
   return result;
 }

@@ -51,15 +51,11 @@ LivoxPoint read_point(LivoxBytes point, DataType type) {
   LivoxPoint result;
   switch (type) {
     case DataType::kCartesian_mm:
-      for (int axis = 0; axis < 3; ++axis)
-        result.position_m[axis] =
-            1e-3 * number_at<std::int32_t>(point, static_cast<std::size_t>(4 * axis));
+      result.position_m = 1e-3 * vector_at<std::int32_t>(point, 0);
       result.reflectivity = point[12];
       break;
     case DataType::kCartesian_cm:
-      for (int axis = 0; axis < 3; ++axis)
-        result.position_m[axis] =
-            1e-2 * number_at<std::int16_t>(point, static_cast<std::size_t>(2 * axis));
+      result.position_m = 1e-2 * vector_at<std::int16_t>(point, 0);
       result.reflectivity = point[6];
       break;
     case DataType::kSpherical: {
@@ -199,11 +195,8 @@ void LivoxStream::add_imu(const Packet& packet, Readings& readings) {
   constexpr double kMostReading = 1e4;
   const auto time_ns = number_at<std::int64_t>(packet.bytes, kTimeAt);
   model::ImuSample sample;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto at = kDataAt + static_cast<std::size_t>(4 * axis);
-    sample.angular_rate_rad_s[axis] = number_at<float>(packet.bytes, at);
-    sample.specific_force_mps2[axis] = kGravity_mps2 * number_at<float>(packet.bytes, at + 12);
-  }
+  sample.angular_rate_rad_s = vector_at<float>(packet.bytes, kDataAt);
+  sample.specific_force_mps2 = kGravity_mps2 * vector_at<float>(packet.bytes, kDataAt + 12);
   if (!(sample.angular_rate_rad_s.norm() < kMostReading) ||
       !(sample.specific_force_mps2.norm() < kMostReading)) {
     readings.fault = Fault::kDamaged;

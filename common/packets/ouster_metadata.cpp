@@ -111,11 +111,9 @@ std::optional<Eigen::Isometry3d> transform(const Fields& fields, const char* sec
   if (!numbers) return std::nullopt;
   if (numbers->size() != 16) fields.fail(name, "has no 16 numbers");
   Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column)
-      result.linear()(row, column) = (*numbers)[static_cast<std::size_t>(4 * row + column)];
-    result.translation()[row] = kMetresPerMm * (*numbers)[static_cast<std::size_t>(4 * row + 3)];
-  }
+  const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(numbers->data());
+  result.linear() = matrix.topLeftCorner<3, 3>();
+  result.translation() = kMetresPerMm * matrix.topRightCorner<3, 1>();
 
   constexpr double kOrthogonal = 1e-3;
   const Eigen::Matrix3d m = result.linear();

@@ -29,12 +29,6 @@ double usual_range_m(std::string_view product_line) {
   return 250.0;
 }
 
-/// x, y, z as float32.
-Eigen::Vector3d vector_at(Bytes bytes, std::size_t at) {
-  return {number_at<float>(bytes, at), number_at<float>(bytes, at + 4),
-          number_at<float>(bytes, at + 8)};
-}
-
 /// One return of one beam.
 struct Return {
   std::uint32_t range_mm = 0;
@@ -272,8 +266,8 @@ struct OusterStream::ImuReading {
 void OusterStream::add_imu_packet(const Packet& packet, Readings& readings) {
   constexpr std::size_t kAccelerationTimeAt = 8;
   const ImuReading reading{number_at<std::int64_t>(packet.bytes, kAccelerationTimeAt),
-                           kStandardGravity_mps2 * vector_at(packet.bytes, 24),
-                           std::numbers::pi / 180.0 * vector_at(packet.bytes, 36)};
+                           kStandardGravity_mps2 * vector_at<float>(packet.bytes, 24),
+                           std::numbers::pi / 180.0 * vector_at<float>(packet.bytes, 36)};
   add_sample(reading, packet.received, readings);
 }
 
@@ -283,8 +277,8 @@ void OusterStream::add_imu_block(const Packet& packet, Readings& readings) {
   for (std::size_t at = kImuBlockAt; at + kImuFooter < packet.bytes.size(); at += kImuSample) {
     const bool is_valid = (number_at<std::uint16_t>(packet.bytes, at + 10) & 1U) != 0;
     if (!is_valid) continue;
-    add_sample({number_at<std::int64_t>(packet.bytes, at), vector_at(packet.bytes, at + 12),
-                vector_at(packet.bytes, at + 24)},
+    add_sample({number_at<std::int64_t>(packet.bytes, at), vector_at<float>(packet.bytes, at + 12),
+                vector_at<float>(packet.bytes, at + 24)},
                packet.received, readings);
   }
 }

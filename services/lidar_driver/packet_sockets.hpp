@@ -45,7 +45,7 @@ class SweepOutbox {
   /// Without a channel: nothing must be posted.
   SweepOutbox() = default;
   /// Publishes on `sweeps`.
-  explicit SweepOutbox(bus::Publisher<model::PointSweep> sweeps) : sweeps_(std::move(sweeps)) {}
+  explicit SweepOutbox(bus::Publisher<model::PointSweep> sweeps) : sweeps_(sweeps) {}
 
   /// False: too many parts wait, and the sweep is left out.
   bool post(const model::PointSweep& sweep);
