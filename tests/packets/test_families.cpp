@@ -140,7 +140,10 @@ TEST_CASE("a clock that is set loses one sweep and mixes no times", "[packets]")
     const Decoded decoded = decode(sensor.description, packets);
     CHECK(decoded.counts.jumps == 1);
     CHECK(decoded.sweeps.size() >= 3);
-    for (const auto& sweep : decoded.sweeps) CHECK(sweep.points.back().time_s < 0.11F);
+    for (const auto& sweep : decoded.sweeps) {
+      CHECK(sweep.points.back().time_s < 0.11F);
+      CHECK(std::abs(sweep.utime - kStart) < 2'000'000);  // placed anew
+    }
   }
 }
 
