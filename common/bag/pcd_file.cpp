@@ -1,5 +1,3 @@
-#include "common/bag/pcd_file.hpp"
-
 #include <fmt/format.h>
 #include <lzf.h>
 
@@ -13,6 +11,8 @@
 #include <sstream>
 
 #include "common/bag/cloud_fields.hpp"
+#include "common/bag/cloud_file.hpp"
+#include "common/bag/text_points.hpp"
 #include "common/io/data_error.hpp"
 
 namespace understory::bag {
@@ -188,94 +188,19 @@ std::vector<std::uint8_t> by_point(const PcdHeader& header, std::uint64_t point_
   return points;
 }
 
-template <class T>
-std::optional<T> number_in(std::string_view word) {
-  T value{};
-  const auto read = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (read.ec != std::errc{} || read.ptr != word.data() + word.size()) return std::nullopt;
-  return value;
-}
-
-template <class T>
-bool put_number(std::string_view word, std::uint8_t* at) {
-  auto value = number_in<T>(word);
-  if constexpr (std::is_integral_v<T>) {
-    // Some write whole numbers as 3.000.
-    const auto real = value ? std::nullopt : number_in<double>(word);
-    constexpr double kExact = 9e15;  // A double holds every whole number up to here.
-    constexpr auto kMost = std::min(kExact, static_cast<double>(std::numeric_limits<T>::max()));
-    constexpr double kLeast = std::is_signed_v<T> ? -kMost : 0.0;
-    if (real && *real == std::floor(*real) && *real >= kLeast && *real <= kMost)
-      value = static_cast<T>(*real);
-  }
-  if (!value) return false;
-  std::memcpy(at, &*value, sizeof *value);
-  return true;
-}
-
-/// One number of a text in its field's type.
-bool put_word(std::string_view word, std::uint8_t type, std::uint8_t* at) {
-  switch (static_cast<FieldType>(type)) {
-    case FieldType::kInt8:
-      return put_number<std::int8_t>(word, at);
-    case FieldType::kUint8:
-      return put_number<std::uint8_t>(word, at);
-    case FieldType::kInt16:
-      return put_number<std::int16_t>(word, at);
-    case FieldType::kUint16:
-      return put_number<std::uint16_t>(word, at);
-    case FieldType::kInt32:
-      return put_number<std::int32_t>(word, at);
-    case FieldType::kUint32:
-      return put_number<std::uint32_t>(word, at);
-    case FieldType::kFloat32:
-      return put_number<float>(word, at);
-    case FieldType::kFloat64:
-      return put_number<double>(word, at);
-    case FieldType::kInt64:
-      return put_number<std::int64_t>(word, at);
-    case FieldType::kUint64:
-      return put_number<std::uint64_t>(word, at);
-  }
-  return false;
-}
-
-std::vector<std::uint8_t> points_of_text(const PcdHeader& header, std::uint64_t point_bytes,
-                                         std::string_view text, std::string_view source) {
-  // A number and what parts it from the next one are two bytes: found before allocating.
-  std::uint64_t numbers = 0;
-  for (const PcdField& field : header.fields) numbers += field.count;
-  if (*header.points * numbers > text.size() / 2 + 1)
-    refuse(source, fmt::format("{} bytes of text for {} points", text.size(), *header.points));
-
-  std::vector<std::uint8_t> points(*header.points * point_bytes);
-  const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; };
-  std::size_t at = 0;
-  const auto next = [&] {
-    while (at < text.size() && is_space(text[at])) ++at;
-    const std::size_t begin = at;
-    while (at < text.size() && !is_space(text[at])) ++at;
-    return text.substr(begin, at - begin);
-  };
-
-  std::uint8_t* to = points.data();
-  for (std::uint64_t i = 0; i < *header.points; ++i) {
-    for (const PcdField& field : header.fields) {
-      for (std::uint32_t c = 0; c < field.count; ++c, to += field.bytes) {
-        const std::string_view word = next();
-        if (field.name != kPadding && !put_word(word, field_type(field), to))
-          refuse(source, fmt::format("'{}' at byte {} of the points is no number of field {}",
-                                     word.substr(0, 40), at - word.size(), field.name));
-      }
-    }
-  }
-  return points;
+std::vector<std::uint8_t> points_of_ascii(const PcdHeader& header, std::string_view text,
+                                          std::string_view source) {
+  std::vector<TextField> fields;
+  for (const PcdField& field : header.fields)
+    fields.push_back({field.name, static_cast<FieldType>(field_type(field)), field.bytes,
+                      field.count, field.name != kPadding});
+  return points_of_text(fields, *header.points, text, source);
 }
 
 std::vector<std::uint8_t> points_of(const PcdHeader& header, std::uint64_t point_bytes,
                                     std::string_view data, std::string_view source) {
   const std::uint64_t size = *header.points * point_bytes;
-  if (header.data == "ascii") return points_of_text(header, point_bytes, data, source);
+  if (header.data == "ascii") return points_of_ascii(header, data, source);
 
   if (header.data == "binary") {
     if (data.size() < size) refuse(source, fmt::format("{} of {} bytes", data.size(), size));
@@ -296,9 +221,9 @@ std::vector<std::uint8_t> points_of(const PcdHeader& header, std::uint64_t point
 
 }  // namespace
 
-PcdFile parse_pcd(std::string_view bytes, std::string_view source) {
+CloudFile parse_pcd(std::string_view bytes, std::string_view source) {
   const PcdHeader header = parse_header(bytes, source);
-  PcdFile file;
+  CloudFile file;
   file.viewpoint = header.viewpoint;
   for (const PcdField& field : header.fields) {
     if (field.name != kPadding)

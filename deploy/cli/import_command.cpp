@@ -15,7 +15,7 @@
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/guarded_import.hpp"
 #include "deploy/cli/import_bag.hpp"
-#include "deploy/cli/import_pcd.hpp"
+#include "deploy/cli/import_clouds.hpp"
 #include "deploy/cli/import_packets.hpp"
 #include "deploy/cli/import_sensors.hpp"
 #include "deploy/cli/import_stem_frames.hpp"
@@ -123,7 +123,7 @@ void add_import_command(CLI::App& parent) {
   victoria->callback([options] { import_victoria_park(*options); });
   add_bag_import(*command);
   add_sensor_imports(*command);
-  add_pcd_import(*command);
+  add_cloud_import(*command);
   add_packet_import(*command);
   add_stem_frames_import(*command);
 }

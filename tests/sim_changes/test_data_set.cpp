@@ -2,7 +2,7 @@
 #include <fstream>
 
 #include "common/bag/cloud_decoder.hpp"
-#include "common/bag/pcd_file.hpp"
+#include "common/bag/cloud_file.hpp"
 #include "common/io/data_error.hpp"
 #include "common/io/text_file.hpp"
 #include "sim/changes/data_set.hpp"
@@ -100,7 +100,7 @@ TEST_CASE("what was written is read back equal") {
   CHECK(text_of_things(drive.things) == text_of_things(data.after.things));
 
   const auto file = reader.whole_file(1, "surface.pcd");
-  const bag::PcdFile pcd = bag::parse_pcd(io::read_whole_file(file), file.string());
+  const bag::CloudFile pcd = bag::parse_pcd(io::read_whole_file(file), file.string());
   const model::PointSweep cloud = bag::CloudDecoder().decode(pcd.cloud);
   const auto sampled = sampled_surface(data.changed.copy().scene, data.changed.copy().built, 100.0);
   REQUIRE(cloud.points.size() == sampled.size());

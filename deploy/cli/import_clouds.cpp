@@ -1,4 +1,4 @@
-#include "deploy/cli/import_pcd.hpp"
+#include "deploy/cli/import_clouds.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/bag/cloud_decoder.hpp"
-#include "common/bag/pcd_file.hpp"
+#include "common/bag/cloud_file.hpp"
 #include "common/io/data_error.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
@@ -21,7 +21,7 @@
 namespace understory::cli {
 namespace {
 
-struct PcdImportOptions {
+struct CloudImportOptions {
   std::string folder;
   std::string out;
   double rate_hz = 0.0;
@@ -48,31 +48,32 @@ void move_to_sensor(const Eigen::Isometry3d& viewpoint, const std::string& point
 }
 
 /// One file as a sweep; none where it has no points.
-std::optional<model::PointSweep> read_sweep(const bag::PcdEntry& entry,
-                                            const PcdImportOptions& options,
+std::optional<model::PointSweep> read_sweep(const bag::CloudEntry& entry,
+                                            const CloudImportOptions& options,
                                             bag::CloudDecoder& decoder) {
   const std::string file = entry.path.string();
-  bag::PcdFile pcd = bag::parse_pcd(read_recorded(file), file);
-  pcd.cloud.header.stamp_ns = entry.utime * 1000;
+  bag::CloudFile parsed = bag::parse_cloud_file(read_recorded(file), entry.path);
+  parsed.cloud.header.stamp_ns = entry.utime * 1000;
   try {
-    model::PointSweep sweep = decoder.decode(pcd.cloud);
+    model::PointSweep sweep = decoder.decode(parsed.cloud);
     if (sweep.points.empty()) return std::nullopt;
-    move_to_sensor(pcd.viewpoint, options.points_in, sweep);
+    move_to_sensor(parsed.viewpoint, options.points_in, sweep);
     return sweep;
   } catch (const io::DataError& error) {
     throw io::DataError(fmt::format("{}: {}", file, error.what()));
   }
 }
 
-void import_pcd(const PcdImportOptions& options) {
-  const std::vector<bag::PcdEntry> files = bag::find_pcd_sequence(options.folder, options.rate_hz);
+void import_clouds(const CloudImportOptions& options) {
+  const std::vector<bag::CloudEntry> files =
+      bag::find_cloud_sequence(options.folder, options.rate_hz);
   RecordingLog log(options.out);
   add_tables(options.tables, log);
   bag::CloudDecoder decoder(options.cloud);
   terminal::Progress progress("importing", static_cast<double>(files.size()));
   std::size_t sweeps = 0;
 
-  for (const bag::PcdEntry& file : files) {
+  for (const bag::CloudEntry& file : files) {
     terminal::throw_if_interrupted();
     if (const auto sweep = read_sweep(file, options, decoder)) {
       log.add_sweep("RAW_SWEEP", *sweep);
@@ -84,7 +85,7 @@ void import_pcd(const PcdImportOptions& options) {
 
   log.commit();
   if (sweeps < files.size())
-    fmt::print(stderr, "import pcd: {} of {} files have no points\n", files.size() - sweeps,
+    fmt::print(stderr, "import clouds: {} of {} files have no points\n", files.size() - sweeps,
                files.size());
   fmt::print("{}\n", decoder.description());
   report_tables(log, sweeps, options.out);
@@ -92,10 +93,16 @@ void import_pcd(const PcdImportOptions& options) {
 
 }  // namespace
 
-void add_pcd_import(CLI::App& import) {
-  const auto options = std::make_shared<PcdImportOptions>();
-  CLI::App* command = import.add_subcommand("pcd", "A sequence of PCD files, one revolution each");
-  command->add_option("folder", options->folder, "Times from timestamps.txt or from the names")
+void add_cloud_import(CLI::App& import) {
+  const auto options = std::make_shared<CloudImportOptions>();
+  CLI::App* command =
+      import
+          .add_subcommand("clouds",
+                          "A sequence of PCD, PLY or KITTI .bin files, one revolution each")
+          ->alias("pcd");
+  command
+      ->add_option("folder", options->folder,
+                   "Its files are of one kind; times from timestamps.txt, times.txt or the names")
       ->required();
   command->add_option("--out", options->out, "The log to write")->required();
   command
@@ -110,7 +117,7 @@ void add_pcd_import(CLI::App& import) {
   add_table_options(*command, options->tables);
   command->callback([options] {
     refuse_to_overwrite(options->folder, options->out);
-    guarded_import([&] { import_pcd(*options); });
+    guarded_import([&] { import_clouds(*options); });
   });
 }
 

@@ -1,4 +1,4 @@
-// `understory import pcd`: PCD files as sweeps.
+// `understory import clouds`: files with a cloud each as sweeps.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -6,6 +6,6 @@
 namespace understory::cli {
 
 /// Adds the command.
-void add_pcd_import(CLI::App& import);
+void add_cloud_import(CLI::App& import);
 
 }  // namespace understory::cli

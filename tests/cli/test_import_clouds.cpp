@@ -25,7 +25,7 @@ struct Fixture {
       file << 10 + i << " 2 " << i % 4 << ' ' << i % 4 << ' ' << 0.001 * i << '\n';
   }
   Outcome import(const std::string& options) const {
-    return understory_command(directory, "import pcd " + (directory / "clouds").string() +
+    return understory_command(directory, "import clouds " + (directory / "clouds").string() +
                                              " --out " + (directory / "out.lcm").string() +
                                              options);
   }

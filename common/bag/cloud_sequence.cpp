@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 
-#include "common/bag/pcd_file.hpp"
+#include "common/bag/cloud_file.hpp"
 #include "common/io/data_error.hpp"
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
@@ -30,15 +31,15 @@ bool is_counting(const std::vector<double>& numbers) {
   return numbers.size() > 1 && numbers.front() >= 0.0 && numbers.front() < 1e6;
 }
 
-std::vector<double> seconds_of_names(std::vector<PcdEntry>& files,
+std::vector<double> seconds_of_names(std::vector<CloudEntry>& files,
                                      const std::filesystem::path& folder, double rate_hz) {
-  std::vector<std::pair<double, PcdEntry>> numbered;
-  for (PcdEntry& file : files) {
+  std::vector<std::pair<double, CloudEntry>> numbered;
+  for (CloudEntry& file : files) {
     const std::string stem = file.path.stem().string();
     io::NumberReader reader(stem, file.path.string());
     numbered.emplace_back(reader.require("a time as the file's name"), file);
   }
-  std::ranges::stable_sort(numbered, {}, &std::pair<double, PcdEntry>::first);
+  std::ranges::stable_sort(numbered, {}, &std::pair<double, CloudEntry>::first);
 
   std::vector<double> numbers;
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -54,23 +55,46 @@ std::vector<double> seconds_of_names(std::vector<PcdEntry>& files,
   return numbers;
 }
 
-}  // namespace
-
-std::vector<PcdEntry> find_pcd_sequence(const std::filesystem::path& folder, double rate_hz) {
-  std::vector<PcdEntry> files;
+/// In the order of their names; of one kind.
+std::vector<CloudEntry> cloud_files(const std::filesystem::path& folder) {
+  std::map<std::string, std::vector<CloudEntry>> by_kind;
   std::error_code failed;
   for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
-    if (entry.path().extension() == ".pcd") files.push_back({0, entry.path()});
+    const std::string kind = entry.path().extension().string();
+    if (kind == ".pcd" || kind == ".ply" || kind == ".bin")
+      by_kind[kind].push_back({0, entry.path()});
   }
-  if (failed || files.empty())
-    throw io::DataError(fmt::format("{}: no folder with .pcd files", folder.string()));
+  if (failed || by_kind.empty())
+    throw io::DataError(
+        fmt::format("{}: no folder with .pcd, .ply or .bin files", folder.string()));
+  if (by_kind.size() > 1)
+    throw io::DataError(fmt::format("{}: {} and {} files: one kind is wanted", folder.string(),
+                                    by_kind.begin()->first, by_kind.rbegin()->first));
+  std::vector<CloudEntry> files = by_kind.begin()->second;
+  std::ranges::sort(files, {}, &CloudEntry::path);
+  return files;
+}
 
-  std::ranges::sort(files, {}, &PcdEntry::path);
+/// KITTI has times.txt in the folder above that of the clouds.
+std::optional<std::filesystem::path> stamps_beside(const std::filesystem::path& folder) {
+  std::error_code failed;
+  const std::filesystem::path above = std::filesystem::absolute(folder / "..").lexically_normal();
+  for (const std::filesystem::path& file :
+       {folder / "timestamps.txt", folder / "times.txt", above / "times.txt"}) {
+    if (std::filesystem::exists(file, failed)) return file;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::vector<CloudEntry> find_cloud_sequence(const std::filesystem::path& folder, double rate_hz) {
+  std::vector<CloudEntry> files = cloud_files(folder);
   std::vector<double> seconds;
-  const std::filesystem::path stamps = folder / "timestamps.txt";
-  if (std::filesystem::exists(stamps, failed)) {
-    const std::string text = io::RecordingFolder(folder).read("timestamps.txt");
-    io::NumberReader reader(text, stamps.string());
+  if (const auto stamps = stamps_beside(folder)) {
+    const std::string text =
+        io::RecordingFolder(stamps->parent_path()).read(stamps->filename().string());
+    io::NumberReader reader(text, stamps->string());
     while (const auto value = reader.next()) seconds.push_back(*value);
   } else {
     seconds = seconds_of_names(files, folder, rate_hz);
@@ -84,7 +108,7 @@ std::vector<PcdEntry> find_pcd_sequence(const std::filesystem::path& folder, dou
       throw io::DataError(fmt::format("{}: {} s is no time", files[i].path.string(), seconds[i]));
     files[i].utime = static_cast<model::Utime>(std::llround(seconds[i] * 1e6));
   }
-  std::ranges::stable_sort(files, {}, &PcdEntry::utime);
+  std::ranges::stable_sort(files, {}, &CloudEntry::utime);
   return files;
 }
 

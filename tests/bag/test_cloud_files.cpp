@@ -1,4 +1,5 @@
-// PCD files: the layouts that drivers and PCL write, in all three kinds, give the same points.
+// PCD, PLY and KITTI's files: the layouts that drivers, PCL and CloudCompare write give the same
+// points.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,7 +8,7 @@
 #include <map>
 
 #include "common/bag/cloud_decoder.hpp"
-#include "common/bag/pcd_file.hpp"
+#include "common/bag/cloud_file.hpp"
 #include "common/io/data_error.hpp"
 #include "tests/bag/cloud_writer.hpp"
 #include "tests/catch.hpp"
@@ -130,8 +131,46 @@ std::vector<PcdColumn> columns_of(Random& random, char type, std::uint32_t bytes
   return columns;
 }
 
+/// A PLY file; `format` as in its header. Faces stand behind the vertices.
+std::string ply(const std::string& format, const std::vector<PcdColumn>& columns,
+                const std::vector<Truth>& points) {
+  std::string text = "ply\nformat " + format + " 1.0\ncomment by nobody\n";
+  text += fmt::format("element vertex {}\n", points.size());
+  for (const PcdColumn& column : columns) {
+    const std::string type = column.type == 'F'  ? (column.bytes == 4 ? "float" : "float64")
+                             : column.bytes == 1 ? "uchar"
+                             : column.bytes == 2 ? "uint16"
+                                                 : "uint";
+    text += fmt::format("property {} {}\n", type, column.name);
+  }
+  text += "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const Truth& point : points) {
+    for (const PcdColumn& column : columns) {
+      if (format == "ascii") {
+        text += fmt::format("{} ", column.value(point));
+        continue;
+      }
+      std::string bytes = raw(column, column.value(point));
+      if (format == "binary_big_endian") std::ranges::reverse(bytes);
+      text += bytes;
+    }
+    if (format == "ascii") text += '\n';
+  }
+  return text + (format == "ascii" ? "3 0 1 2\n" : std::string(13, '\1'));
+}
+
+void check_same(const model::PointSweep& sweep, const std::vector<Truth>& points) {
+  REQUIRE(sweep.points.size() == points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    CHECK((sweep.points[i].position() - points[i].position_m).norm() < 1e-5);
+    CHECK(sweep.points[i].ring == points[i].ring);
+    CHECK(sweep.points[i].intensity == points[i].intensity);
+    CHECK(std::abs(static_cast<double>(sweep.points[i].time_s) - points[i].time_s) < 2e-6);
+  }
+}
+
 model::PointSweep decoded(const std::string& text, bag::CloudDecoder& decoder) {
-  bag::PcdFile file = bag::parse_pcd(text, "cloud.pcd");
+  bag::CloudFile file = bag::parse_pcd(text, "cloud.pcd");
   file.cloud.header.stamp_ns = kStamp;
   return decoder.decode(file.cloud);
 }
@@ -173,17 +212,68 @@ TEST_CASE("PCD files of all kinds, types and units hold the same points", "[pcd]
       CAPTURE(time.name, time.type, time.bytes, time.unit_s, kind, form.line_end == "\r\n");
       bag::CloudDecoder decoder;
       const model::PointSweep sweep = decoded(pcd(form, points), decoder);
-      REQUIRE(sweep.points.size() == points.size());
       CHECK(sweep.has_times);
       CHECK(sweep.rings == 16);
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        CHECK((sweep.points[i].position() - points[i].position_m).norm() < 1e-5);
-        CHECK(sweep.points[i].ring == points[i].ring);
-        CHECK(sweep.points[i].intensity == points[i].intensity);
-        CHECK(std::abs(static_cast<double>(sweep.points[i].time_s) - points[i].time_s) < 2e-6);
-      }
+      check_same(sweep, points);
     }
   }
+}
+
+TEST_CASE("PLY files of all kinds hold the same points, with CloudCompare's names", "[pcd]") {
+  Random random(5);
+  for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
+    const std::vector<Truth> points = revolution(random);
+    std::vector<PcdColumn> columns = columns_of(random, 'F', 8, "timestamp", 1.0, 1e-9 * kStamp);
+    std::erase_if(columns,
+                  [](const PcdColumn& column) { return column.count > 1 || column.name == "_"; });
+    for (PcdColumn& column : columns) {
+      if (column.name == "intensity") column.name = "scalar_Intensity";
+    }
+    const std::string text = ply(format, columns, points);
+    CAPTURE(format);
+    const auto sweep_of = [](const std::string& bytes) {
+      bag::CloudFile file = bag::parse_ply(bytes, "cloud.ply");
+      file.cloud.header.stamp_ns = kStamp;
+      return bag::CloudDecoder().decode(file.cloud);
+    };
+    check_same(sweep_of(text), points);
+
+    const auto is_read = [&](const std::string& bytes) {
+      try {
+        sweep_of(bytes);
+        return true;
+      } catch (const io::DataError&) {
+        return false;
+      }
+    };
+    for (std::size_t size = 0; size + 40 < text.size(); size += 997)
+      CHECK_FALSE(is_read(text.substr(0, size)));
+    for (int i = 0; i < 300; ++i) {
+      std::string damaged = text;
+      for (int k = 0; k < 3; ++k) damaged[random() % damaged.size()] = static_cast<char>(random());
+      is_read(damaged);
+    }
+  }
+  CHECK_THROWS_WITH(bag::parse_ply("ply\nformat ascii 1.0\nelement face 1\nend_header\n", "a.ply"),
+                    Contains("a.ply: element face 1: vertices are wanted first"));
+}
+
+TEST_CASE("KITTI's files hold x, y, z and intensity; rings are found", "[pcd]") {
+  Random random(6);
+  const std::vector<Truth> points = revolution(random);
+  std::string bytes;
+  for (const Truth& point : points) {
+    const std::array<float, 4> values{point.position_m.x(), point.position_m.y(),
+                                      point.position_m.z(),
+                                      static_cast<float>(point.intensity) / 255.0F};
+    bytes.append(reinterpret_cast<const char*>(values.data()), sizeof values);
+  }
+  const bag::CloudFile file = bag::parse_cloud_file(bytes, "000000.bin");
+  const model::PointSweep sweep = bag::CloudDecoder().decode(file.cloud);
+  CHECK(sweep.points.size() == points.size());
+  CHECK(sweep.rings == 16);
+  CHECK_THROWS_WITH(bag::parse_cloud_file(bytes.substr(1), "000000.bin"),
+                    Contains("000000.bin: ") && Contains("no whole points of 16"));
 }
 
 TEST_CASE("rows of an organised PCD file are rings, what is no number is no return", "[pcd]") {
@@ -214,7 +304,7 @@ TEST_CASE("a viewpoint is read, and a file without points is no error", "[pcd]")
   PcdForm form;
   form.columns = columns_of(random, 'F', 4, "time", 1.0, 0.0);
   form.viewpoint = "1 2 3 0.7071068 0 0 0.7071068";
-  const bag::PcdFile file = bag::parse_pcd(pcd(form, {}), "cloud.pcd");
+  const bag::CloudFile file = bag::parse_pcd(pcd(form, {}), "cloud.pcd");
   CHECK(file.cloud.width * file.cloud.height == 0);
   CHECK((file.viewpoint * Eigen::Vector3d::UnitX() - Eigen::Vector3d(1, 3, 3)).norm() < 1e-6);
   form.viewpoint = "1 2 3 0 0 0 0";
@@ -267,7 +357,7 @@ TEST_CASE("a sequence of PCD files has its times from names, a table or a rate",
   };
   const auto utimes = [&](const char* folder, double rate_hz = 0.0) {
     std::vector<model::Utime> all;
-    for (const auto& entry : bag::find_pcd_sequence(scratch.path() / folder, rate_hz))
+    for (const auto& entry : bag::find_cloud_sequence(scratch.path() / folder, rate_hz))
       all.push_back(entry.utime);
     return all;
   };
@@ -292,4 +382,11 @@ TEST_CASE("a sequence of PCD files has its times from names, a table or a rate",
   write("named/timestamps.txt", "12.25\n");
   CHECK(utimes("named") == Utimes{12'250'000});
   CHECK_THROWS_AS(utimes("none"), io::DataError);
+
+  // KITTI has the times in the folder above.
+  for (const char* name : {"000000.bin", "000001.bin"}) write(std::string("00/velodyne/") + name);
+  write("00/times.txt", "0.0\n0.1036\n");
+  CHECK(utimes("00/velodyne") == Utimes{0, 103'600});
+  write("00/velodyne/000002.ply");
+  CHECK_THROWS_WITH(utimes("00/velodyne"), Contains(".bin and .ply files: one kind is wanted"));
 }
