@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -31,13 +32,36 @@ bool is_counting(const std::vector<double>& numbers) {
   return numbers.size() > 1 && numbers.front() >= 0.0 && numbers.front() < 1e6;
 }
 
+/// The number that a name is; none of "scan_000001".
+std::optional<double> number_of(const CloudEntry& file) {
+  const std::string stem = file.path.stem().string();
+  double number = 0.0;
+  const auto read = std::from_chars(stem.data(), stem.data() + stem.size(), number);
+  if (read.ec != std::errc{} || read.ptr != stem.data() + stem.size() || !std::isfinite(number))
+    return std::nullopt;
+  return number;
+}
+
+/// Names that count are numbers of periods; of other names the order alone counts.
+std::vector<double> seconds_by_rate(const std::vector<double>& numbers, double rate_hz) {
+  std::vector<double> seconds;
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    seconds.push_back((is_counting(numbers) ? numbers[i] : static_cast<double>(i)) / rate_hz);
+  return seconds;
+}
+
 std::vector<double> seconds_of_names(std::vector<CloudEntry>& files,
                                      const std::filesystem::path& folder, double rate_hz) {
   std::vector<std::pair<double, CloudEntry>> numbered;
-  for (CloudEntry& file : files) {
-    const std::string stem = file.path.stem().string();
-    io::NumberReader reader(stem, file.path.string());
-    numbered.emplace_back(reader.require("a time as the file's name"), file);
+  for (const CloudEntry& file : files) {
+    const std::optional<double> number = number_of(file);
+    if (!number && rate_hz <= 0.0)
+      throw io::DataError(fmt::format(
+          "{}: a name that is no time: timestamps.txt or times.txt states the files' times, --rate "
+          "HZ how many files a second has",
+          file.path.string()));
+    if (!number) return seconds_by_rate(std::vector<double>(files.size(), 0.0), rate_hz);
+    numbered.emplace_back(*number, file);
   }
   std::ranges::stable_sort(numbered, {}, &std::pair<double, CloudEntry>::first);
 
@@ -46,12 +70,13 @@ std::vector<double> seconds_of_names(std::vector<CloudEntry>& files,
     files[i] = numbered[i].second;
     numbers.push_back(numbered[i].first);
   }
-  if (is_counting(numbers) && rate_hz <= 0.0)
+  if (rate_hz > 0.0) return seconds_by_rate(numbers, rate_hz);
+  if (is_counting(numbers))
     throw io::DataError(fmt::format(
         "{}: names that count {:g} to {:g} are no times; --rate HZ states how many files a second "
         "has, timestamps.txt their times",
         folder.string(), numbers.front(), numbers.back()));
-  for (double& number : numbers) number = rate_hz > 0.0 ? number / rate_hz : seconds_of(number);
+  for (double& number : numbers) number = seconds_of(number);
   return numbers;
 }
 
@@ -107,8 +132,11 @@ std::vector<CloudEntry> find_cloud_sequence(const std::filesystem::path& folder,
     if (!(seconds[i] >= 0.0 && seconds[i] < 9e9))
       throw io::DataError(fmt::format("{}: {} s is no time", files[i].path.string(), seconds[i]));
     files[i].utime = static_cast<model::Utime>(std::llround(seconds[i] * 1e6));
+    if (i > 0 && files[i].utime <= files[i - 1].utime)
+      throw io::DataError(fmt::format("{}: its time, {:.6f} s, is not behind that of {}",
+                                      files[i].path.string(), seconds[i],
+                                      files[i - 1].path.filename().string()));
   }
-  std::ranges::stable_sort(files, {}, &CloudEntry::utime);
   return files;
 }
 

@@ -175,8 +175,10 @@ NavSatFix read_nav_sat_fix(MessageReader& reader) {
   const double variance = 0.5 * (covariance[0] + covariance[4]);
   if (covariance_kind != 0 && std::isfinite(variance) && variance > 0.0)
     fix.sigma_m = std::sqrt(variance);
-  fix.has_fix =
-      status >= 0 && std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 360.0;
+  // Receivers without a position send zeros, some of them with the status of a fix.
+  const bool is_zero = fix.latitude_deg == 0.0 && fix.longitude_deg == 0.0;
+  fix.has_fix = status >= 0 && !is_zero && std::abs(fix.latitude_deg) <= 90.0 &&
+                std::abs(fix.longitude_deg) <= 360.0;
   return fix;
 }
 

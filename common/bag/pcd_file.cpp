@@ -102,15 +102,13 @@ void check(PcdHeader& header, std::string_view source) {
   if (*header.points > kMostPcdPoints)
     refuse(source, fmt::format("{} points, more than the {} that are read", *header.points,
                                kMostPcdPoints));
-  // Of an organised cloud rows are beams: a shape that is not that of the points says nothing.
   const std::uint64_t height = header.height.value_or(1);
-  const bool has_shape = height > 0 && height <= kMostPcdPoints && header.width &&
-                         *header.width <= kMostPcdPoints &&
-                         *header.width * height == *header.points;
-  if (!has_shape) {
-    header.height = 1;
-    header.width = header.points;
-  }
+  const std::uint64_t width = header.width.value_or(*header.points);
+  if (height > kMostPcdPoints || width > kMostPcdPoints || width * height != *header.points)
+    refuse(source,
+           fmt::format("WIDTH {} times HEIGHT {} is not POINTS {}", width, height, *header.points));
+  header.height = height;
+  header.width = width;
 }
 
 void read_line(std::istringstream& line, const std::string& key, std::string_view source,
@@ -204,6 +202,9 @@ std::vector<std::uint8_t> points_of(const PcdHeader& header, std::uint64_t point
 
   if (header.data == "binary") {
     if (data.size() < size) refuse(source, fmt::format("{} of {} bytes", data.size(), size));
+    if (data.size() - size >= point_bytes)
+      refuse(source, fmt::format("{} bytes behind the last of {} points", data.size() - size,
+                                 *header.points));
     return {data.begin(), data.begin() + static_cast<std::ptrdiff_t>(size)};
   }
 

@@ -134,6 +134,8 @@ CloudFile parse_kitti_bin(std::string_view bytes, std::string_view source) {
 
 CloudFile parse_cloud_file(std::string_view bytes, const std::filesystem::path& file) {
   const std::string extension = file.extension().string();
+  if (file.string().ends_with(".pcd.bin"))
+    refuse_ply(file.string(), "five numbers a point (nuScenes) are not read");
   if (extension == ".ply") return parse_ply(bytes, file.string());
   if (extension == ".bin") return parse_kitti_bin(bytes, file.string());
   return parse_pcd(bytes, file.string());

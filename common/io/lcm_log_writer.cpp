@@ -3,8 +3,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <utility>
 
@@ -126,8 +128,25 @@ class LcmLogWriter::Impl {
   std::vector<std::uint8_t> buffer_;
 };
 
+namespace {
+
+/// What --out names by mistake (a map, a table, a recording) is not lost.
+const std::filesystem::path& not_another_file(const std::filesystem::path& path) {
+  std::error_code failed;
+  if (!std::filesystem::is_regular_file(path, failed)) return path;
+  std::array<char, 4> start{};
+  std::ifstream file(path, std::ios::binary);
+  file.read(start.data(), start.size());
+  constexpr std::array<char, 4> kSync{'\xED', '\xA1', '\xDA', '\x01'};
+  if (file.gcount() > 0 && start != kSync)
+    throw LogError(path.string() + ": is there already and is no LCM log: it is not overwritten");
+  return path;
+}
+
+}  // namespace
+
 LcmLogWriter::LcmLogWriter(const std::filesystem::path& path, LogCreation creation)
-    : impl_(std::make_unique<Impl>(path, creation)) {}
+    : impl_(std::make_unique<Impl>(not_another_file(path), creation)) {}
 LcmLogWriter::~LcmLogWriter() = default;
 LcmLogWriter::LcmLogWriter(LcmLogWriter&&) noexcept = default;
 LcmLogWriter& LcmLogWriter::operator=(LcmLogWriter&&) noexcept = default;

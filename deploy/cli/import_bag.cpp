@@ -146,6 +146,9 @@ void import_chosen(const BagImportOptions& options, bag::Bag& bag, const bag::Su
   BagLog log(options.out);
   BagMessages messages(bag, survey, choice, mounts, conversion, log);
   read_all(bag, choice, messages);
+  if (choice.cloud && log.sweeps() == 0)
+    throw io::DataError(fmt::format("{}: not one sweep ({})", bag.topics()[*choice.cloud].name,
+                                    messages.cloud_text()));
   const BagFindings findings{messages.has_times(), messages.has_rings(), conversion.wheelbase_m};
   const std::string settings = bag_settings(bag, survey, choice, mounts, findings, remarks);
   log.commit();
@@ -165,6 +168,7 @@ void import_bag(const BagImportOptions& options) {
   try {
     const bag::Survey found = survey_bag(*bag, options.conversion.cloud);
     const BagMounts mounts(found.transforms, options.base, options.mounts);
+    mounts.require_known(found);
     if (options.is_list) return print_bag_list(options.path, *bag, found, options.topics, mounts);
     import_chosen(options, *bag, found, mounts);
   } catch (const io::DataError& error) {

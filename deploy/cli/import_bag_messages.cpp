@@ -152,6 +152,20 @@ void BagMessages::take_imu(const bag::Message& message) {
   log_.add("RAW_IMU", sample, sample.utime);
 }
 
+/// Velocity of the vehicle's origin and angular rate, frame `vehicle`, from those of a frame on it.
+std::pair<Eigen::Vector3d, Eigen::Vector3d> BagMessages::on_vehicle(const bag::Odometry& odometry,
+                                                                    const std::string& frame) {
+  const auto mount =
+      frame.empty() ? std::make_optional(Eigen::Isometry3d::Identity()) : mounts_.find(frame);
+  if (!mount) {
+    twist_frame_ = frame;
+    return {odometry.velocity_mps, odometry.angular_rate_rad_s};
+  }
+  const Eigen::Vector3d rate_rad_s = mount->linear() * odometry.angular_rate_rad_s;
+  const Eigen::Vector3d lever_m = mount->translation();
+  return {mount->linear() * odometry.velocity_mps - rate_rad_s.cross(lever_m), rate_rad_s};
+}
+
 void BagMessages::take_odometry(const bag::Message& message) {
   bag::MessageReader reader = reader_of(bag_, message);
   const std::string& type = bag_.topics()[message.topic].type;
@@ -159,8 +173,12 @@ void BagMessages::take_odometry(const bag::Message& message) {
     throw io::DataError("--speed-from-pose: " + type + " has no pose");
   const bag::Odometry odometry = read_odometry(reader, type);
   const bag::Pose& pose = odometry.pose;
-  double speed_mps = odometry.velocity_mps.x();
-  double rate_rad_s = odometry.angular_rate_rad_s.z();
+  if (!odometry.velocity_mps.allFinite() || !odometry.angular_rate_rad_s.allFinite())
+    throw io::DataError("a velocity that is no number");
+  const auto [velocity_mps, vehicle_rate_rad_s] =
+      on_vehicle(odometry, bag::is_twist_type(type) ? pose.header.frame : pose.child_frame);
+  double speed_mps = velocity_mps.x();
+  double rate_rad_s = vehicle_rate_rad_s.z();
   fastest_mps_ = std::max(fastest_mps_, odometry.velocity_mps.norm());
   if (!first_position_m_) first_position_m_ = pose.pose.translation();
   farthest_m_ = std::max(farthest_m_, (pose.pose.translation() - *first_position_m_).norm());
@@ -251,6 +269,10 @@ std::vector<std::string> BagMessages::remarks() const {
     lines.push_back(fmt::format("{} clouds without a point are left out", empty_clouds_));
   if (without_fix_ > 0)
     lines.push_back(fmt::format("{} messages of GNSS without a fix are left out", without_fix_));
+  if (!twist_frame_.empty())
+    lines.push_back(
+        fmt::format("the velocity is taken as the vehicle's, though it is that of {}: {}",
+                    twist_frame_, mounts_.missing(twist_frame_)));
   if (log_.late() > 0)
     lines.push_back(
         fmt::format("{} messages have stamps more than 1 s behind others: do the clocks "

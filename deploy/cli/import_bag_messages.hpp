@@ -57,6 +57,8 @@ class BagMessages {
   void take_scan(const bag::Message& message);
   void take_imu(const bag::Message& message);
   void take_odometry(const bag::Message& message);
+  std::pair<Eigen::Vector3d, Eigen::Vector3d> on_vehicle(const bag::Odometry& odometry,
+                                                         const std::string& frame);
   void take_fix(const bag::Message& message);
   void take_truth(const bag::Message& message);
   std::int64_t shift_ns(std::size_t topic) const;
@@ -78,6 +80,7 @@ class BagMessages {
   std::optional<io::LocalPlane> plane_;
   std::uint64_t without_fix_ = 0;
   std::optional<bag::Pose> last_pose_;  ///< Of odometry.
+  std::string twist_frame_;             ///< Of a twist, where nothing joins it to the vehicle.
   double farthest_m_ = 0.0;             ///< From the first pose of odometry.
   double fastest_mps_ = 0.0;
   std::optional<Eigen::Vector3d> first_position_m_;

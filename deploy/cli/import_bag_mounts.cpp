@@ -1,10 +1,12 @@
 #include "deploy/cli/import_bag_mounts.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <utility>
 
 #include "common/io/data_error.hpp"
@@ -78,6 +80,18 @@ BagMounts::BagMounts(bag::StaticTransforms transforms, const std::string& base,
   if (base_.empty()) base_ = "base_link";
   for (const std::string& text : stated)
     stated_[text.substr(0, text.find('='))] = stated_mount(text);
+}
+
+void BagMounts::require_known(const bag::Survey& survey) const {
+  std::set<std::string> known;
+  for (const std::string& frame : transforms_.frames()) known.insert(frame);
+  for (const bag::TopicSurvey& topic : survey.topics) known.insert(topic.frame);
+  known.erase("");
+  for (const auto& [frame, mount] : stated_) {
+    if (!known.contains(frame))
+      throw io::DataError(
+          fmt::format("--mount {}: no such frame; the bag has {}", frame, fmt::join(known, ", ")));
+  }
 }
 
 std::optional<Eigen::Isometry3d> BagMounts::find(const std::string& frame) const {

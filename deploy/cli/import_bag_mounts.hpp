@@ -21,6 +21,8 @@ class BagMounts {
   BagMounts(bag::StaticTransforms transforms, const std::string& base,
             const std::vector<std::string>& stated);
 
+  /// Throws io::DataError where a frame that was stated is none of the bag's.
+  void require_known(const bag::Survey& survey) const;
   /// vehicle_T_frame; none = stated by neither the bag nor an option.
   std::optional<Eigen::Isometry3d> find(const std::string& frame) const;
   const std::string& base() const { return base_; }  ///< The frame `vehicle` in the bag.

@@ -83,6 +83,7 @@ void import_clouds(const CloudImportOptions& options) {
   }
   if (sweeps == 0) throw io::DataError(fmt::format("{}: no file with a point", options.folder));
 
+  log.require_common_time();
   log.commit();
   if (sweeps < files.size())
     fmt::print(stderr, "import clouds: {} of {} files have no points\n", files.size() - sweeps,

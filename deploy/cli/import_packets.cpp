@@ -77,7 +77,11 @@ PacketSource choose_source(const PacketImportOptions& options) {
     survey = packets::survey_capture(options.path);
     flows = point_flows(survey, options);
   }
-  if (flows.empty()) fail_unknown(options, "no point packets of a laser that is known");
+  if (flows.empty())
+    fail_unknown(options,
+                 options.sensor.empty()
+                     ? "no point packets of a laser that is known"
+                     : "no point packets of a known laser from --sensor " + options.sensor);
   const auto is_of_another = [&](const packets::Flow& flow) {
     return flow.sender != flows.front().sender || flow.port != flows.front().port;
   };
@@ -175,6 +179,7 @@ void import_capture(const PacketImportOptions& options) {
   if (counts.sweeps == 0)
     fail(fmt::format("{}: {} {} packets, {} refused: not one whole sweep", options.path,
                      counts.packets, source.model, counts.refused));
+  log.require_common_time();
   log.commit();
   report(options, source, decoder, capture, log);
 }

@@ -79,11 +79,33 @@ void print_placing(const NamedPoints& known, const Placing& placing, bool is_lis
   if (known.points.size() == 2)
     fmt::print("two points leave nothing over to check the placing with: a third one would\n");
   if (is_listed) print_residuals(known, placing);
-  if (std::abs(placing.scale - 1.0) > kOddScale)
+  // Fixes are too rough to tell of a scale.
+  if (is_listed && std::abs(placing.scale - 1.0) > kOddScale)
     fmt::print(
         "distances between the points are {:.5f} times those of the map, which stays as it "
         "is: another unit, another system?\n",
         placing.scale);
+}
+
+/// Root mean square of what counts: of fixes without the wild ones, which place_map() gives little
+/// weight.
+double rms_that_counts_m(const Placing& placing, bool is_by_hand) {
+  if (is_by_hand) return placing.rms_m;
+  std::vector<double> sorted = placing.residuals_m;
+  std::ranges::sort(sorted);
+  // Three sigma, by the median: it is 1.18 sigma of the distance in a plane.
+  const double most_m = 3.0 / 1.18 * sorted[sorted.size() / 2];
+  double sum = 0.0;
+  double count = 0.0;
+  for (const double residual_m : sorted) {
+    if (residual_m > most_m) break;
+    sum += residual_m * residual_m;
+    count += 1.0;
+  }
+  const double wild = static_cast<double>(sorted.size()) - count;
+  if (wild > 0.0)
+    fmt::print("{:.0f} fixes are more than {:.1f} m off and count little\n", wild, most_m);
+  return std::sqrt(sum / std::max(count, 1.0));
 }
 
 model::MapReference from_points(const GeoreferenceOptions& options, const MapFile& file) {
@@ -97,11 +119,12 @@ model::MapReference from_points(const GeoreferenceOptions& options, const MapFil
   print_placing(known, placing, is_by_hand);
 
   const double most_m = options.most_rms_m.value_or(is_by_hand ? kMostControlRms_m : kMostFixRms_m);
-  if (placing.rms_m > most_m)
+  const double rms_m = rms_that_counts_m(placing, is_by_hand);
+  if (rms_m > most_m)
     fail(fmt::format(
         "{}: not placed: {} does not fit the map: {:.3f} m (RMS) where {} m is the "
         "most (--most-rms-m); are the columns swapped, or is it another map?",
-        options.file, is_by_hand ? options.control_points : options.fixes, placing.rms_m, most_m));
+        options.file, is_by_hand ? options.control_points : options.fixes, rms_m, most_m));
   return placing.reference;
 }
 

@@ -2,11 +2,15 @@
 // sweeps, which are too large to keep.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "common/io/data_error.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/wire/convert.hpp"
@@ -23,6 +27,7 @@ class RecordingLog {
   template <class Message>
   void add(const std::string& channel, Message message) {
     set_sequence(message, counts_[channel]++);
+    small_span_.add(message.utime);
     small_.emplace(message.utime, Event{channel, wire::encode_message(message)});
   }
   /// Writes what is due before the revolution ends, then the sweep's parts.
@@ -31,6 +36,7 @@ class RecordingLog {
     for (const model::SweepPoint& point : sweep.points) last = std::max(last, point.time_s);
     const model::Utime end = sweep.utime + static_cast<model::Utime>(1e6F * last);
     write_until(end);
+    sweep_span_.add(sweep.utime);
     for (model::PointSweep& part : split_sweep(sweep, kPointsPerPart)) {
       part.sequence = counts_[channel]++;
       writer_.write(std::max(end, latest_), channel, wire::encode_message(part));
@@ -41,6 +47,19 @@ class RecordingLog {
   void commit() {
     while (!small_.empty()) write_first();
     writer_.commit();
+  }
+  /// Throws io::DataError where sweeps and other messages have no time in common: their clocks are
+  /// not the same.
+  void require_common_time() const {
+    if (!sweep_span_.overlaps(small_span_))
+      throw io::DataError(
+          fmt::format("sweeps from {:.3f} to {:.3f} s, other messages from {:.3f} to {:.3f} s: "
+                      "their clocks have "
+                      "no time in common",
+                      1e-6 * static_cast<double>(sweep_span_.first),
+                      1e-6 * static_cast<double>(sweep_span_.last),
+                      1e-6 * static_cast<double>(small_span_.first),
+                      1e-6 * static_cast<double>(small_span_.last)));
   }
   /// Messages added on this channel, parts of sweeps counted singly.
   std::uint64_t count(const std::string& channel) const {
@@ -73,7 +92,25 @@ class RecordingLog {
     small_.erase(first);
   }
 
+  /// The stamps of some messages.
+  struct Span {
+    model::Utime first = std::numeric_limits<model::Utime>::max();
+    model::Utime last = std::numeric_limits<model::Utime>::min();
+
+    void add(model::Utime utime) {
+      first = std::min(first, utime);
+      last = std::max(last, utime);
+    }
+    /// Also where one of them has none.
+    bool overlaps(const Span& other) const {
+      constexpr model::Utime kApart = 10'000'000;
+      const bool is_one_empty = last < first || other.last < other.first;
+      return is_one_empty || (first <= other.last + kApart && other.first <= last + kApart);
+    }
+  };
+
   io::LcmLogWriter writer_;
+  Span sweep_span_, small_span_;
   std::multimap<model::Utime, Event> small_;
   std::map<std::string, std::uint64_t> counts_;
   model::Utime latest_ = 0;

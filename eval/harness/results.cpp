@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -36,6 +37,14 @@ nlohmann::json result_document(const std::string& experiment, nlohmann::json con
 }
 
 void write_json(const fs::path& file, const nlohmann::json& json) {
+  // A log or a map that --json names by mistake is not lost.
+  std::error_code failed;
+  if (fs::is_regular_file(file, failed)) {
+    const int first = std::ifstream(file).peek();
+    if (first != std::char_traits<char>::eof() && first != '{' && first != '[')
+      throw std::runtime_error(file.string() +
+                               ": is there already and is no JSON: it is not overwritten");
+  }
   io::write_whole_file(file,
                        json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }

@@ -327,6 +327,16 @@ TEST_CASE("a PCD file that is cut or damaged is refused or read, never worse", "
       parses(damaged);
     }
   }
+  PcdForm form{"binary", columns_of(random, 'F', 4, "time", 1.0, 0.0)};
+  std::string wrong = pcd(form, points);
+  const std::string count = fmt::format("POINTS {}", points.size());
+  wrong.replace(wrong.find(count), count.size(), fmt::format("POINTS {}", points.size() / 2));
+  CHECK_THROWS_WITH(bag::parse_pcd(wrong, "wrong.pcd"),
+                    Contains("wrong.pcd: WIDTH") && Contains("is not POINTS"));
+  CHECK_THROWS_WITH(bag::parse_pcd(pcd(form, points) + std::string(100, '\0'), "long.pcd"),
+                    Contains("long.pcd: 100 bytes behind the last of"));
+  CHECK_THROWS_WITH(bag::parse_cloud_file("", "a.pcd.bin"), Contains("five numbers a point"));
+
   const std::string fields = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n";
   for (const char* kind : {"ascii", "binary", "binary_compressed"}) {
     CHECK_FALSE(parses(fields + "POINTS 99999999999\nDATA " + kind + "\n"));
@@ -382,6 +392,14 @@ TEST_CASE("a sequence of PCD files has its times from names, a table or a rate",
   write("named/timestamps.txt", "12.25\n");
   CHECK(utimes("named") == Utimes{12'250'000});
   CHECK_THROWS_AS(utimes("none"), io::DataError);
+
+  // Names that are no times want a rate, too; times that stand still are refused.
+  write("words/scan_1.ply");
+  write("words/scan_2.ply");
+  CHECK_THROWS_WITH(utimes("words"), Contains("scan_1.ply: a name that is no time"));
+  CHECK(utimes("words", 20.0) == Utimes{0, 50'000});
+  write("words/timestamps.txt", "5\n5\n");
+  CHECK_THROWS_WITH(utimes("words"), Contains("scan_2.ply: its time, 5.000000 s, is not behind"));
 
   // KITTI has the times in the folder above.
   for (const char* name : {"000000.bin", "000001.bin"}) write(std::string("00/velodyne/") + name);

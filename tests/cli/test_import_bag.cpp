@@ -236,6 +236,47 @@ void check_same(const std::vector<model::PointSweep>& found,
 
 }  // namespace
 
+TEST_CASE("import bag: the velocity of a frame becomes that of the vehicle", "[import]") {
+  const BagFolder folder;
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> number(-1.0, 1.0);
+  const Serialisation cdr{bag::Encoding::kCdr, false};
+  // A frame on the vehicle, turned and beside its origin; the vehicle drives and turns.
+  for (int i = 0; i < 10; ++i) {
+    const Eigen::Isometry3d vehicle_T_frame =
+        place(2.0 * number(random), number(random), 1.0, 3.0 * number(random));
+    const double speed_mps = 3.0 + number(random);
+    const Eigen::Vector3d rate_rad_s(0.0, 0.0, 0.3 * number(random));
+    const Eigen::Vector3d there_mps =
+        Eigen::Vector3d(speed_mps, 0.0, 0.0) + rate_rad_s.cross(vehicle_T_frame.translation());
+    bag::Odometry odometry;
+    odometry.pose.header = {kStart_ns, "gps"};
+    odometry.velocity_mps = vehicle_T_frame.linear().transpose() * there_mps;
+    odometry.angular_rate_rad_s = rate_rad_s;
+    const std::vector<bag::Pose> mounts(1, frame_in("base_link", "gps", vehicle_T_frame));
+    const std::vector<Recorded> messages{
+        {"/tf_static", "tf2_msgs/TFMessage", kStart_ns, transforms_message(cdr, mounts)},
+        {"/twist", "geometry_msgs/TwistStamped", kStart_ns, twist_message(cdr, odometry, false)}};
+    const std::string bag = folder.write({BagForm::Kind::kMcap}, messages);
+    const Outcome outcome = folder.import(bag, "--odometry /twist --out " + folder.path("run.lcm"));
+    REQUIRE(outcome.status == 0);
+    auto channels = channels_of(folder.path("run.lcm"));
+    const auto wheels = wire::decode_message<model::WheelSample>(channels["RAW_WHEELS"].at(0));
+    REQUIRE(wheels);
+    CHECK(wheels->speed_mps == Approx(speed_mps).margin(1e-9));
+    CHECK(wheels->steering_rad ==
+          Approx(std::atan(kWheelbase_m * rate_rad_s.z() / speed_mps)).margin(1e-9));
+
+    folder.refused(bag, "--odometry /twist --mount lasr=1,2,3",
+                   "--mount lasr: no such frame; the bag has base_link, gps");
+    odometry.velocity_mps.x() = std::nan("");
+    const std::string damaged = folder.write(
+        {BagForm::Kind::kMcap},
+        {{"/twist", "geometry_msgs/TwistStamped", kStart_ns, twist_message(cdr, odometry, false)}});
+    folder.refused(damaged, "--odometry /twist", "/twist, message 1: a velocity that is no number");
+  }
+}
+
 TEST_CASE("import bag: packets of Ouster's drivers, with the metadata of the bag", "[import]") {
   const BagFolder folder;
   std::mt19937_64 random(8);

@@ -83,3 +83,20 @@ TEST_CASE_METHOD(Fixture, "names that only count want a rate", "[import][pcd]") 
   REQUIRE(import(" --rate 10").status == 0);
   CHECK(sweeps()[2].utime == 200'000);
 }
+
+TEST_CASE_METHOD(Fixture, "what is no log is not overwritten, clocks must have a time in common",
+                 "[import][pcd]") {
+  write("12.0.pcd", kIdentity, 40);
+  std::ofstream(directory / "out.lcm") << "x_m,y_m\n1,2\n";
+  const Outcome kept = import("");
+  CHECK(kept.status == 1);
+  CHECK_THAT(kept.error, Contains("out.lcm: is there already and is no LCM log"));
+  CHECK(read_text(directory / "out.lcm") == "x_m,y_m\n1,2\n");
+  std::filesystem::remove(directory / "out.lcm");
+
+  std::ofstream(directory / "imu.csv") << "t_s,gx,gy,gz,ax,ay,az\n1700000000,0,0,0,0,0,9.81\n";
+  const Outcome apart = import(" --imu " + (directory / "imu.csv").string());
+  CHECK(apart.status == 1);
+  CHECK_THAT(apart.error, Contains("their clocks have no time in common"));
+  CHECK_FALSE(std::filesystem::exists(directory / "out.lcm"));
+}

@@ -47,6 +47,12 @@ TEST_CASE("links are followed and stay links", "[output]") {
   fs::create_symlink("circle", directory / "circle");
   CHECK_THROWS_AS(write_whole_file(directory / "circle", "x"), DataError);
 
+  // A log takes the place of nothing but a log or an empty file.
+  CHECK_THROWS_WITH(test::write_log(directory / "link", {{0, 0, "C", {1}}}),
+                    Catch::Matchers::Contains("link: is there already and is no LCM log"));
+  CHECK(read_whole_file(directory / "there/target") == "new");
+  write_whole_file(directory / "link", "");
+  test::write_log(directory / "link", {{0, 0, "C", {1}}});
   test::write_log(directory / "link", {{0, 0, "C", {1}}});
   CHECK(fs::is_symlink(directory / "link"));
   CHECK(fs::file_size(directory / "there/target") == 30);
