@@ -139,6 +139,9 @@ std::optional<Fault> OusterStream::check(Bytes bytes) const {
   if (metadata_.profile.pixel != OusterPixel::kLegacy && bytes[0] != kLidarPacket)
     return Fault::kOtherModel;
 
+  constexpr int kSure = 2;
+  if (short_frames_ >= kSure) return Fault::kOtherModel;
+
   std::optional<std::int64_t> first_ns;
   for (std::size_t c = 0; c < metadata_.columns_per_packet; ++c) {
     const Column column = column_at(bytes, c);
@@ -175,12 +178,26 @@ std::size_t OusterStream::from_window(std::size_t column) const {
          metadata_.columns_per_frame;
 }
 
+/// Modes have 512, 1024 or 2048 columns. With the wrong one the cloud would be bent.
+bool OusterStream::is_of_fewer_columns() const {
+  const std::size_t columns = metadata_.columns_per_frame;
+  const bool is_whole_turn = from_window(metadata_.last_column) + 1 == columns;
+  return is_whole_turn && has_begin_ && !has_gap_ &&
+         (2 * next_column_ == columns || 4 * next_column_ == columns);
+}
+
 void OusterStream::end_frame(std::vector<model::PointSweep>& sweeps) {
   const std::size_t columns = from_window(metadata_.last_column) + 1;
   if (next_column_ < columns && has_begin_) ++counts_.gaps;
   auto sweep = builder_.take();
-  if (sweep && has_begin_) sweeps.push_back(*std::move(sweep));
+  if (is_of_fewer_columns()) {
+    ++short_frames_;
+  } else {
+    short_frames_ = 0;
+    if (sweep && has_begin_) sweeps.push_back(*std::move(sweep));
+  }
   next_column_ = 0;
+  has_gap_ = false;
 }
 
 void OusterStream::add_lidar(const Packet& packet, Readings& readings) {
@@ -211,7 +228,10 @@ void OusterStream::add_lidar(const Packet& packet, Readings& readings) {
     const Column column = column_at(packet.bytes, c);
     if (!column.is_valid) continue;
     const std::size_t place = from_window(column.id);
-    if (place > next_column_ && has_begin_) ++counts_.gaps;
+    if (place > next_column_) {
+      has_gap_ = true;
+      if (has_begin_) ++counts_.gaps;
+    }
     next_column_ = std::max(next_column_, place + 1);
     add_column(packet.bytes, column);
   }

@@ -69,6 +69,7 @@ class OusterStream {
   void add_sample(const ImuReading& reading, model::Utime received, Readings& readings);
   void add_column(std::span<const std::uint8_t> bytes, const Column& column);
   void take_time(std::int64_t time_ns, model::Utime received);
+  bool is_of_fewer_columns() const;
   void end_frame(std::vector<model::PointSweep>& sweeps);
   std::size_t from_window(std::size_t column) const;
 
@@ -84,6 +85,10 @@ class OusterStream {
   std::optional<std::uint32_t> frame_id_;
   std::size_t next_column_ = 0;  ///< Expected, counted from the window's begin.
   bool has_begin_ = false;       ///< The frame under way has its first columns.
+  bool has_gap_ = false;         ///< Columns are missing in between in the frame under way.
+  /// Frames in a row that ended after a half or a quarter of the columns, with no hole: the sensor
+  /// has fewer columns than its metadata.
+  int short_frames_ = 0;
   std::uint64_t imu_samples_ = 0;
 };
 

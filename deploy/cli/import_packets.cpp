@@ -177,8 +177,9 @@ void import_capture(const PacketImportOptions& options) {
 
   const packets::StreamCounts& counts = packets::counts(decoder);
   if (counts.sweeps == 0)
-    fail(fmt::format("{}: {} {} packets, {} refused: not one whole sweep", options.path,
-                     counts.packets, source.model, counts.refused));
+    fail(fmt::format("{}: {} {} packets, {} refused: not one whole sweep{}", options.path,
+                     counts.packets, source.model, counts.refused,
+                     counts.refused > 0 ? "; do model and metadata fit the packets?" : ""));
   log.require_common_time();
   log.commit();
   report(options, source, decoder, capture, log);

@@ -104,7 +104,7 @@ double rms_that_counts_m(const Placing& placing, bool is_by_hand) {
   }
   const double wild = static_cast<double>(sorted.size()) - count;
   if (wild > 0.0)
-    fmt::print("{:.0f} fixes are more than {:.1f} m off and count little\n", wild, most_m);
+    fmt::print("{:.0f} fixes are more than {:.2f} m off and count little\n", wild, most_m);
   return std::sqrt(sum / std::max(count, 1.0));
 }
 

@@ -125,6 +125,7 @@ class CaptureFile {
 
   Bytes framed(const Bytes& packet) const {
     Bytes frame;
+    frame.reserve(packet.size() + 64);
     using Link = CaptureStyle::Link;
     if (style_.link <= Link::kTwoVlans) {
       frame.resize(12, 0x22);

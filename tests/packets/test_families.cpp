@@ -105,6 +105,29 @@ TEST_CASE("points and samples come back as they were sent", "[packets]") {
   }
 }
 
+TEST_CASE("metadata of another mode of an Ouster are noticed, not believed", "[packets]") {
+  std::mt19937_64 random(21);
+  for (const MadeUpSensor& sensor : {made_up_ousters()[0], made_up_ousters()[1]}) {
+    const MadeUpRecording recording = sensor.record(6, kStart, random);
+    for (const int columns : {1024, 2048}) {
+      packets::SensorDescription other = sensor.description;
+      const auto replace = [&](const std::string& behind, const std::string& text,
+                               const std::string& by) {
+        const std::size_t at = other.description.find(text, other.description.find(behind));
+        REQUIRE(at != std::string::npos);
+        other.description.replace(at, text.size(), by);
+      };
+      replace("columns_per_frame", "512", std::to_string(columns));
+      replace("column_window", "511", std::to_string(columns - 1));
+      replace("lidar_mode", "512x", std::to_string(columns) + "x");
+      const Decoded decoded = decode(other, recording.packets);
+      CAPTURE(sensor.name, columns);
+      CHECK(decoded.sweeps.empty());
+      CHECK(decoded.counts.refused > decoded.counts.packets / 2);
+    }
+  }
+}
+
 TEST_CASE("a sensor's clock that counts from power-on is moved onto the computer's", "[packets]") {
   std::mt19937_64 random(2);
   for (const MadeUpSensor& sensor : one_of_each_family()) {
