@@ -119,8 +119,9 @@ class SimulatedBag {
   void take(model::GnssFix& fix) {
     fix.utime += kStart_ns / 1000;
     add("/fix", "sensor_msgs/NavSatFix", [&](const Serialisation& how) {
-      return fix_message(how, {header(fix.utime, "gnss"), true, 48.0 + 1e-5 * fix.east_north_m.y(),
-                               9.0, 500.0, 2.0});
+      return fix_message(how,
+                         {header(fix.utime, "gnss"), true, 48.0 + fix.east_north_m.y() / 111'200.0,
+                          9.0 + fix.east_north_m.x() / 74'490.0, 500.0, 2.0});
     });
     ++fixes_;
   }

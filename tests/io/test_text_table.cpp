@@ -62,13 +62,14 @@ TEST_CASE("what is written between quotation marks comes back", "[io]") {
     std::vector<io::TextRow> rows;
     for (std::size_t i = 0; i < 1 + random() % 6; ++i) {
       if (random() % 3 == 0) {
-        text += (random() % 2 == 0 ? "# a remark" : "") + end;
+        text += fmt::format("{}{}", random() % 2 == 0 ? "# a remark" : "", end);
         ++line;
       }
       io::TextRow& row = rows.emplace_back(io::TextRow{line, {}});
       for (std::size_t k = 0; k < columns; ++k) {
         row.cells.push_back(i == 0 ? fmt::format("column {}", k) : random_cell(random));
-        text += (k == 0 ? "" : std::string(1, delimiter)) + written(row.cells.back(), random);
+        if (k > 0) text.push_back(delimiter);
+        text.append(written(row.cells.back(), random));
         line += line_ends(row.cells.back());
       }
       text += end;
