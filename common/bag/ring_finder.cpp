@@ -86,6 +86,7 @@ std::optional<FoundRings> rings_by_order(std::span<const Eigen::Vector3f> points
   if (share < kOneWay && share > 1.0 - kOneWay) return std::nullopt;
 
   FoundRings found{{}, static_cast<std::uint16_t>(order.runs()), "the order of the points"};
+  found.ring.reserve(points.size());
   const bool is_upwards = share >= kOneWay;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::size_t run = order.run_of(i);
@@ -132,6 +133,7 @@ std::vector<double> beams_of(std::span<const double> elevations) {
     if (width > 2 * apart) return {};
   }
   std::vector<double> middles;
+  middles.reserve(beams.size());
   for (const Beam& beam : beams)
     middles.push_back(kLowest + kBin * beam.sum / static_cast<double>(beam.points));
   return middles;
@@ -147,6 +149,7 @@ std::optional<FoundRings> rings_by_elevation(std::span<const Eigen::Vector3f> po
   if (beams.empty()) return std::nullopt;
 
   FoundRings found{{}, static_cast<std::uint16_t>(beams.size()), "elevations"};
+  found.ring.reserve(points.size());
   for (const Eigen::Vector3f& point : points) {
     const double e = elevation(point);
     const auto above = std::ranges::lower_bound(beams, e);

@@ -52,6 +52,7 @@ inline bag::PointCloud cloud_of(const bag::Header& header, const model::PointSwe
 struct SimulatedDrive {
   std::map<std::string, std::vector<wire::Bytes>> log;
   std::map<bag::Encoding, std::vector<Recorded>> bag;
+  std::vector<Eigen::Vector2d> latitude_longitude_deg;  ///< Of the fixes.
 
   template <class Message>
   void add_to_log(const std::string& channel, const Message& message) {
@@ -118,12 +119,13 @@ class SimulatedBag {
   }
   void take(model::GnssFix& fix) {
     fix.utime += kStart_ns / 1000;
+    const Eigen::Vector2d place_deg(48.0 + fix.east_north_m.y() / 111'200.0,
+                                    9.0 + fix.east_north_m.x() / 74'490.0);
+    drive_.latitude_longitude_deg.push_back(place_deg);
     add("/fix", "sensor_msgs/NavSatFix", [&](const Serialisation& how) {
-      return fix_message(how,
-                         {header(fix.utime, "gnss"), true, 48.0 + fix.east_north_m.y() / 111'200.0,
-                          9.0 + fix.east_north_m.x() / 74'490.0, 500.0, 2.0});
+      return fix_message(
+          how, {header(fix.utime, "gnss"), true, place_deg.x(), place_deg.y(), 500.0, 2.0});
     });
-    ++fixes_;
   }
   void take(sim::TruePose& pose) {
     add("/reference", "geometry_msgs/PoseStamped", [&](const Serialisation& how) {
@@ -155,7 +157,6 @@ class SimulatedBag {
   std::vector<bag::Encoding> encodings_;
   std::int64_t now_ns_ = 0;
   std::uint64_t parts_ = 0;
-  std::uint64_t fixes_ = 0;
 };
 
 }  // namespace understory::test

@@ -83,12 +83,13 @@ TEST_CASE("import bag: every container gives what the sensors gave, byte for byt
     CHECK(channels.at("GROUND_TRUTH").size() > 100);
     CHECK(channels.at("RAW_GNSS").size() >= 7);
     // `map georeference --fixes` places maps by these.
-    for (const wire::Bytes& bytes : channels.at("RAW_GNSS")) {
-      const auto fix = wire::decode_message<gnss_t>(bytes);
+    REQUIRE(channels.at("RAW_GNSS").size() == drive.latitude_longitude_deg.size());
+    for (std::size_t i = 0; i < drive.latitude_longitude_deg.size(); ++i) {
+      const auto fix = wire::decode_message<gnss_t>(channels.at("RAW_GNSS")[i]);
       REQUIRE(fix);
       CHECK(fix->has_geodetic != 0);
-      CHECK(fix->latitude_deg == Approx(48.0).margin(0.01));
-      CHECK(fix->longitude_deg == 9.0);
+      CHECK(fix->latitude_deg == drive.latitude_longitude_deg[i].x());
+      CHECK(fix->longitude_deg == drive.latitude_longitude_deg[i].y());
       CHECK(fix->altitude_m == 500.0);
     }
     if (first.empty()) first = file_bytes(log);

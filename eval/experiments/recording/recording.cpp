@@ -1,14 +1,12 @@
 // `understory eval recording`: a recorded drive through the whole chain, against the reference that
 // the log carries.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <ranges>
 
 #include "common/io/lcm_log.hpp"
 #include "common/terminal/interrupt.hpp"
@@ -62,9 +60,10 @@ void watch_pictures(harness::SensorChain& chain, Recording& recording) {
 /// Rows of a chain that heard nothing would look like those of a drive on which nothing was found.
 void refuse_unfed(const Options& options, const std::map<std::string, bool>& taken) {
   if (std::ranges::any_of(taken, [](const auto& channel) { return channel.second; })) return;
-  throw io::LogError(fmt::format("{}: no channel of it is an input of the stages of {}; it has {}",
-                                 options.log, options.config_dir,
-                                 fmt::join(std::views::keys(taken), " ")));
+  std::string channels;
+  for (const auto& [channel, is_taken] : taken) channels += " " + channel;
+  throw io::LogError(fmt::format("{}: no channel of it is an input of the stages of {}; it has{}",
+                                 options.log, options.config_dir, channels));
 }
 
 Recording drive_recording(const Options& options, const std::atomic<bool>& stop) {
