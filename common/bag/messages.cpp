@@ -198,6 +198,7 @@ std::optional<PacketScan> read_scan(MessageReader reader, const ScanLayout& layo
   try {
     if (layout.has_header) scan.header = read_header(reader);
     const std::size_t packets = reader.count(kStamp + std::max<std::size_t>(layout.fixed_bytes, 4));
+
     for (std::size_t i = 0; i < packets; ++i) {
       PacketScan::Packet packet{read_stamp(reader), {}};
       packet.bytes = layout.fixed_bytes > 0 ? reader.take(layout.fixed_bytes) : reader.bytes();
@@ -210,6 +211,7 @@ std::optional<PacketScan> read_scan(MessageReader reader, const ScanLayout& layo
   } catch (const io::DataError&) {
     return std::nullopt;
   }
+
   if (reader.rest() >= kPadding) return std::nullopt;
   return scan;
 }

@@ -40,9 +40,11 @@ TextField vertex_field(const std::string& type, std::string name, std::string_vi
                                                 {"uint", "uint32", FieldType::kUint32, 4},
                                                 {"float", "float32", FieldType::kFloat32, 4},
                                                 {"double", "float64", FieldType::kFloat64, 8}}};
+
   constexpr std::string_view kCloudCompare = "scalar_";
   std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
   if (name.starts_with(kCloudCompare)) name.erase(0, kCloudCompare.size());
+
   for (const Known& known : kKnown) {
     if (type == known.name || type == known.other) return {name, known.type, known.bytes};
   }
@@ -64,6 +66,7 @@ PlyHeader parse_ply_header(std::string_view bytes, std::string_view source) {
     std::string first;
     std::string second;
     line >> key >> first >> second;
+
     if (key == "format") header.format = first;
     if (key == "element" && ++elements == 1) {
       const auto read =
@@ -74,6 +77,7 @@ PlyHeader parse_ply_header(std::string_view bytes, std::string_view source) {
     if (key == "property" && elements == 1)
       header.fields.push_back(vertex_field(first, second, source));
     if (key != "end_header") continue;
+
     header.end = std::min(at, bytes.size());
     if (header.fields.empty() || header.fields.size() > 256)
       refuse_ply(source, "no properties of vertices that could be");

@@ -1,6 +1,8 @@
 #include "common/io/lcm_log_format.hpp"
 
 #include <algorithm>
+#include <array>
+#include <fstream>
 #include <limits>
 
 namespace understory::io {
@@ -51,6 +53,14 @@ std::optional<Header> decode(std::span<const std::uint8_t, kHeaderBytes> bytes) 
 
 bool plausible_channel(std::span<const std::uint8_t> name) {
   return std::all_of(name.begin(), name.end(), [](std::uint8_t c) { return c > 0x20 && c < 0x7F; });
+}
+
+bool begins_as_log(const std::filesystem::path& file) {
+  std::array<char, kMagicBytes.size()> start{};
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(start.data(), start.size());
+  return stream && std::ranges::equal(start, kMagicBytes, {},
+                                      [](char c) { return static_cast<std::uint8_t>(c); });
 }
 
 }  // namespace understory::io

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <span>
 
@@ -33,5 +34,8 @@ Header decode_fields(std::span<const std::uint8_t, kHeaderBytes> bytes);
 std::optional<Header> decode(std::span<const std::uint8_t, kHeaderBytes> bytes);
 /// Whether LCM could have such a channel name: printable ASCII.
 bool plausible_channel(std::span<const std::uint8_t> name);
+
+/// Whether a file begins as a log does; also false where it cannot be read.
+bool begins_as_log(const std::filesystem::path& file);
 
 }  // namespace understory::io

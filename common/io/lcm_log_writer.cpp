@@ -3,10 +3,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <utility>
 
@@ -133,12 +131,8 @@ namespace {
 /// What --out names by mistake (a map, a table, a recording) is not lost.
 const std::filesystem::path& not_another_file(const std::filesystem::path& path) {
   std::error_code failed;
-  if (!std::filesystem::is_regular_file(path, failed)) return path;
-  std::array<char, 4> start{};
-  std::ifstream file(path, std::ios::binary);
-  file.read(start.data(), start.size());
-  constexpr std::array<char, 4> kSync{'\xED', '\xA1', '\xDA', '\x01'};
-  if (file.gcount() > 0 && start != kSync)
+  const bool is_file = std::filesystem::is_regular_file(path, failed);
+  if (is_file && std::filesystem::file_size(path, failed) > 0 && !begins_as_log(path))
     throw LogError(path.string() + ": is there already and is no LCM log: it is not overwritten");
   return path;
 }

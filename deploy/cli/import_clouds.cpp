@@ -116,6 +116,7 @@ void add_cloud_import(CLI::App& import) {
                    "of the world in which VIEWPOINT is the sensor's pose")
       ->check(CLI::IsMember({"sensor", "world"}));
   add_table_options(*command, options->tables);
+
   command->callback([options] {
     refuse_to_overwrite(options->folder, options->out);
     guarded_import([&] { import_clouds(*options); });

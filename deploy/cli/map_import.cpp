@@ -2,12 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "common/io/lcm_log_format.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/failure.hpp"
@@ -45,11 +44,7 @@ struct MapsToStore {
 
 /// By its first bytes, else by its name: an empty or damaged log is none of a table either.
 bool is_lcm_log(const fs::path& file) {
-  constexpr std::array<char, 4> kMagic{'\xED', '\xA1', '\xDA', '\x01'};
-  std::array<char, 4> start{};
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(start.data(), start.size());
-  return start == kMagic || file.extension() == ".lcm";
+  return io::begins_as_log(file) || file.extension() == ".lcm";
 }
 
 StoredMap map_of_drive(std::uint32_t map_id, const LogMaps::Found& found) {
