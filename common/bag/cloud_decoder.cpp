@@ -128,9 +128,11 @@ model::PointSweep CloudDecoder::decode(const PointCloud& cloud) {
                           static_cast<float>(layout.y.value(at)),
                           static_cast<float>(layout.z.value(at))};
       if (!point.position_m.allFinite() || point.position_m.isZero(0.0F)) continue;
-      if (layout.time) {
-        point.time = layout.time->value(at);
+      if (layout.time && layout.time->is_integer()) {
         point.ticks = layout.time->integer(at);
+        point.time = static_cast<double>(point.ticks);
+      } else if (layout.time) {
+        point.time = layout.time->value(at);
         if (!std::isfinite(point.time)) continue;
       }
       point.ring = layout.ring_at(at, row, column);
@@ -277,6 +279,7 @@ std::vector<std::int64_t> CloudDecoder::times_from_stamp(const std::vector<RawPo
                                                          std::int64_t stamp_ns) const {
   constexpr double kMost_ns = 4e18;
   const double unit_ns = 1e9 * *unit_s_;
+  const std::int64_t tick_ns = std::llround(unit_ns);
   const std::int64_t base_ns = is_absolute_ && !is_own_clock_ ? stamp_ns : 0;
   std::vector<std::int64_t> times;
   times.reserve(points.size());
@@ -287,8 +290,7 @@ std::vector<std::int64_t> CloudDecoder::times_from_stamp(const std::vector<RawPo
       throw io::DataError(fmt::format("{:g} is no time of a point", point.time));
     const bool is_exact = point.ticks != 0 && unit_ns >= 1.0;
     const std::int64_t time_ns =
-        is_exact ? point.ticks * static_cast<std::int64_t>(std::llround(unit_ns))
-                 : static_cast<std::int64_t>(std::llround(rough_ns));
+        is_exact ? point.ticks * tick_ns : static_cast<std::int64_t>(std::llround(rough_ns));
     if (std::abs(static_cast<double>(time_ns) - static_cast<double>(base_ns)) > kMost_ns)
       throw io::DataError(fmt::format("{:g} is no time of a point", point.time));
     times.push_back(time_ns - base_ns);
@@ -321,8 +323,9 @@ void CloudDecoder::set_times(const std::vector<RawPoint>& points, const Header& 
 
 model::PointSweep CloudDecoder::sweep_of(std::vector<RawPoint> points, const Header& header,
                                          bool has_times, bool has_rings) {
+  const double most_m = kNoise * options_.max_range_m;
   std::erase_if(points, [&](const RawPoint& point) {
-    return point.position_m.cast<double>().norm() > kNoise * options_.max_range_m;
+    return point.position_m.cast<double>().squaredNorm() > most_m * most_m;
   });
   if (has_rings) decide_rings(points);
   model::PointSweep sweep;
@@ -332,15 +335,16 @@ model::PointSweep CloudDecoder::sweep_of(std::vector<RawPoint> points, const Hea
   sweep.max_range_m = options_.max_range_m;
 
   sweep.points.reserve(points.size());
+  const double intensity_factor = intensity_factor_.value_or(1.0);
   for (const RawPoint& from : points) {
     model::SweepPoint point;
     point.x_m = from.position_m.x();
     point.y_m = from.position_m.y();
     point.z_m = from.position_m.z();
     point.ring = ring_of(from.ring);
-    const double intensity = from.intensity * intensity_factor_.value_or(1.0);
+    const double intensity = from.intensity * intensity_factor;
     if (intensity > 0.0)
-      point.intensity = static_cast<std::uint8_t>(std::min(std::round(intensity), 255.0));
+      point.intensity = static_cast<std::uint8_t>(std::min(intensity + 0.5, 255.0));
     if (has_rings) rings_ = std::max<std::uint32_t>(rings_, point.ring + 1U);
     sweep.points.push_back(point);
   }

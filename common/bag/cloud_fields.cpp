@@ -62,7 +62,7 @@ std::int64_t FieldReader::integer(const std::uint8_t* point) const {
   }
 }
 
-double FieldReader::value(const std::uint8_t* point) const {
+double FieldReader::converted(const std::uint8_t* point) const {
   const std::uint8_t* at = point + field_.offset;
   if (type() == FieldType::kFloat32)
     return static_cast<double>(number_from<float>(at, is_big_endian_));

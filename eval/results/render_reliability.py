@@ -73,7 +73,7 @@ def reliability(document):
     p99 = sorted(drive["latency_p99_ms"] for drive in drives)
     lost = sum(drive["lost"] for drive in drives)
     seconds = sum(drive["drive_s"] for drive in drives)
-    return [f"{len(drives)} drives of {number(seconds / 60, 0)} minutes in all, load {document['config']['load']}; {lost} messages lost "
+    return [f"{len(drives)} drives of {number(seconds / 60, 0)} minutes in all, {document['config'].get('jobs', 1)} at a time, load {document['config']['load']}; {lost} messages lost "
             f"(sockets that overflow while a process stops). `SLAM_POSE` behind the end of its sweep, outside of delays: p99 "
             f"{number(p99[len(p99) // 2], 0)} ms (median of the drives).",
             "", *_promises(drives), "", *_kinds(drives)]

@@ -17,7 +17,7 @@
 #include "common/model/slam_output.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/wire/convert.hpp"
-#include "deploy/launch/child_process.hpp"
+#include "eval/experiments/reliability/processes.hpp"
 
 namespace understory::eval::experiments::reliability {
 namespace {
@@ -57,30 +57,6 @@ class ScratchFolder {
 std::filesystem::path beside_this_program(const std::string& name) {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
 }
-
-/// Processes that are killed when this goes.
-class Processes {
- public:
-  Processes() = default;
-  ~Processes() {
-    for (const auto& child : children_) child.signal(SIGCONT);
-    for (const auto& child : children_) child.signal(SIGKILL);
-    for (const auto& child : children_) {
-      while (!child.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-  }
-  Processes(const Processes&) = delete;
-  Processes& operator=(const Processes&) = delete;
-  void start(const launch::Command& command) {
-    children_.push_back(launch::ChildProcess::start(command));
-  }
-  void ask_to_end() const {
-    for (const auto& child : children_) child.signal(SIGTERM);
-  }
-
- private:
-  std::vector<launch::ChildProcess> children_;
-};
 
 void start_stack(Processes& processes, const LiveOptions& options, const std::string& url,
                  const std::filesystem::path& state) {
@@ -256,8 +232,6 @@ LiveDrive play(const SensorTape& tape, std::span<const Fault> faults, const Live
   const ScratchFolder folder;
   Listener listener(url, faults);
   Processes processes;
-  for (int i = 0; i < options.load; ++i)
-    processes.start({"/bin/sh", {"-c", "while :; do :; done"}, {}});
   start_stack(processes, options, url, folder.path());
   wait_for_processes(listener, processes_of(options.config_dir));
 

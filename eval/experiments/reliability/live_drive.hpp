@@ -15,7 +15,6 @@ namespace understory::eval::experiments::reliability {
 /// How a drive is played.
 struct LiveOptions {
   std::filesystem::path config_dir = "deploy/config/lidar";
-  int load = 0;             ///< Processes that only compute, beside it.
   bool supervised = false;  ///< By `understory launch`; else nobody restarts what is stopped.
 };
 

@@ -2,17 +2,22 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/reliability/live_drive.hpp"
+#include "eval/experiments/reliability/processes.hpp"
 #include "eval/experiments/reliability/reliability.hpp"
 #include "eval/harness/results.hpp"
+#include "eval/tools/parallel.hpp"
 #include "eval/tools/quantile.hpp"
 
 namespace understory::eval::experiments::reliability {
@@ -30,6 +35,8 @@ struct ReliabilityOptions {
   double apart_s = 12.0;
   double length_m = 1000.0;
   std::string only;
+  int load = 0;
+  int jobs = 1;
   LiveOptions live;
   std::string json;
 };
@@ -61,8 +68,8 @@ nlohmann::json to_json(const Broken& broken) {
           {"not_later", broken.not_later}};
 }
 
-void print(const Fault& fault, const AfterFault& slam, const AfterFault& filter,
-           const std::string& not_ok) {
+std::string line_of(const Fault& fault, const AfterFault& slam, const AfterFault& filter,
+                    const std::string& not_ok) {
   const auto of = [](const AfterFault& score) {
     return fmt::format("{:>4}/{:<4} {:>6.3f} m {:>5.1f} sigma {}", score.within_3_sigma,
                        score.poses, score.largest_step_m, score.largest_sigmas,
@@ -70,9 +77,8 @@ void print(const Fault& fault, const AfterFault& slam, const AfterFault& filter,
                        : score.is_announced ? "told"
                                             : "    ");
   };
-  fmt::print("{:<26} {:>5.2f} s | {} | {} | {}\n", fault.what, fault.to_s - fault.from_s, of(slam),
-             of(filter), not_ok);
-  std::fflush(stdout);
+  return fmt::format("{:<26} {:>5.2f} s | {} | {} | {}\n", fault.what, fault.to_s - fault.from_s,
+                     of(slam), of(filter), not_ok);
 }
 
 /// One drive: its faults as rows, and what holds for the whole of it.
@@ -80,17 +86,16 @@ nlohmann::json drive_once(const ReliabilityOptions& options, std::uint64_t seed)
   const SensorTape tape = record_tape(options.length_m, seed);
   std::mt19937_64 random(seed);
   const std::vector<Fault> faults = faults_of(options, tape.seconds(), random);
-  fmt::print("drive {}: {:.0f} s, {} delays, load {}\n{:<34} | {:<35} | {:<35} | {}\n", seed,
-             tape.seconds(), faults.size(), options.live.load, "", "SLAM_POSE: in 3 sigma, step",
-             "EKF_POSE", "HEALTH");
-  std::fflush(stdout);
-
+  std::string text =
+      fmt::format("drive {}: {:.0f} s, {} delays, load {}\n{:<34} | {:<35} | {:<35} | {}\n", seed,
+                  tape.seconds(), faults.size(), options.load, "", "SLAM_POSE: in 3 sigma, step",
+                  "EKF_POSE", "HEALTH");
   const LiveDrive drive = play(tape, faults, options.live);
   const std::vector<AfterFault> slam = judge(drive.slam, tape.truth, faults);
   const std::vector<AfterFault> filter = judge(drive.filter, tape.truth, faults);
   nlohmann::json rows = nlohmann::json::array();
   for (std::size_t i = 0; i < faults.size(); ++i) {
-    print(faults[i], slam[i], filter[i], drive.not_ok[i]);
+    text += line_of(faults[i], slam[i], filter[i], drive.not_ok[i]);
     rows.push_back({{"what", faults[i].what},
                     {"from_s", faults[i].from_s},
                     {"seconds", faults[i].to_s - faults[i].from_s},
@@ -101,11 +106,12 @@ nlohmann::json drive_once(const ReliabilityOptions& options, std::uint64_t seed)
   const double p50_ms = tools::quantile(drive.latency_ms, 0.5);
   const double p99_ms = tools::quantile(drive.latency_ms, 0.99);
   fmt::print(
-      "SLAM_POSE behind the end of its sweep, outside of delays: p50 {:.1f} ms, p99 {:.1f} ms; "
+      "{}SLAM_POSE behind the end of its sweep, outside of delays: p50 {:.1f} ms, p99 {:.1f} ms; "
       "{} messages lost\n",
-      p50_ms, p99_ms, drive.lost);
+      text, p50_ms, p99_ms, drive.lost);
+  std::fflush(stdout);
   return {{"seed", seed},
-          {"load", options.live.load},
+          {"load", options.load},
           {"supervised", options.live.supervised},
           {"drive_s", tape.seconds()},
           {"faults", rows},
@@ -139,28 +145,49 @@ nlohmann::json drives_in(const std::string& file, const nlohmann::json& config) 
   return document.at("rows");
 }
 
+std::uint64_t seed_of(const nlohmann::json& drive) { return drive.at("seed").get<std::uint64_t>(); }
+
+std::vector<std::uint64_t> seeds_left(const ReliabilityOptions& options,
+                                      const nlohmann::json& drives) {
+  std::set<std::uint64_t> done;
+  for (const auto& drive : drives) done.insert(seed_of(drive));
+  std::vector<std::uint64_t> left;
+  for (int i = 0; i < options.drives; ++i) {
+    const std::uint64_t seed = options.first_seed + static_cast<std::uint64_t>(i);
+    if (!done.contains(seed)) left.push_back(seed);
+  }
+  return left;
+}
+
 void run(const ReliabilityOptions& options) {
   const nlohmann::json config = {{"delays", options.faults},
                                  {"longest_s", options.longest_s},
                                  {"apart_s", options.apart_s},
                                  {"length_m", options.length_m},
                                  {"only", options.only},
-                                 {"load", options.live.load},
+                                 {"load", options.load},
+                                 {"jobs", options.jobs},
                                  {"supervised", options.live.supervised},
                                  {"config", options.live.config_dir.string()}};
   nlohmann::json drives = drives_in(options.json, config);
-  std::set<std::uint64_t> done;
-  for (const auto& drive : drives) done.insert(drive.at("seed").get<std::uint64_t>());
+  const std::vector<std::uint64_t> seeds = seeds_left(options, drives);
+  Processes load;
+  for (int i = 0; i < options.load; ++i) load.start({"/bin/sh", {"-c", "while :; do :; done"}, {}});
 
   bool all_sound = true;
-  for (int i = 0; i < options.drives; ++i) {
-    const std::uint64_t seed = options.first_seed + static_cast<std::uint64_t>(i);
-    if (done.contains(seed)) continue;
-    drives.push_back(drive_once(options, seed));
-    all_sound = all_sound && is_sound(drives.back());
+  std::mutex mutex;
+  const auto drive_and_keep = [&](std::size_t i) {
+    const nlohmann::json drive = drive_once(options, seeds[i]);
+    const std::lock_guard lock(mutex);
+    all_sound = all_sound && is_sound(drive);
+    drives.push_back(drive);
+    std::sort(drives.begin(), drives.end(),
+              [](const auto& a, const auto& b) { return seed_of(a) < seed_of(b); });
     if (!options.json.empty())
       harness::write_json(options.json, harness::result_document("reliability", config, drives));
-  }
+  };
+  tools::run_in_parallel(seeds.size(), options.jobs, "drives", terminal::catch_interrupts(),
+                         drive_and_keep);
   if (!all_sound)
     throw std::runtime_error(
         "a pose was broken, did not come back, or was over 1 m off for 2 s with HEALTH OK");
@@ -173,7 +200,7 @@ void add_reliability_experiment(CLI::App& eval) {
       "reliability",
       "Real processes, at the speed of the drive, while messages are held back and processes stop");
   const auto options = std::make_shared<ReliabilityOptions>();
-  command.add_option("--drives", options->drives, "Drives, one after another")
+  command.add_option("--drives", options->drives, "Drives")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command.add_option("--first-seed", options->first_seed, "The others follow it")
@@ -190,8 +217,13 @@ void add_reliability_experiment(CLI::App& eval) {
       ->check(CLI::Range(250.0, 100000.0))
       ->capture_default_str();
   command.add_option("--only", options->only, "Delays with this in their name");
-  command.add_option("--load", options->live.load, "Processes beside it that only compute")
+  command.add_option("--load", options->load, "Processes beside them that only compute")
       ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  command
+      .add_option("--jobs", options->jobs,
+                  "Drives at a time: each has a bus of its own and is load for the others")
+      ->check(CLI::Range(1, 64))
       ->capture_default_str();
 
   command.add_flag("--supervised", options->live.supervised,
