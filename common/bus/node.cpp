@@ -86,7 +86,9 @@ void Node::handle(Input& input, const BusMessage& message) {
   if (message.received_us != 0) {
     monitor_.count_latency(computer_clock_.wall_us() - message.received_us);
   }
-  if (!is_recovering() && state_.is_due(now())) save_snapshot();
+  if (is_recovering()) return;
+  if (const auto kept = state_.settle()) show_kept(*kept);
+  if (state_.is_due(now())) save_snapshot();
 }
 
 bool Node::admit(Input& input, const BusMessage& message) {

@@ -140,7 +140,8 @@ std::unique_ptr<StateStore> recover_state(std::unique_ptr<HostedService>& hosted
                                           const Service& service, Bus& bus, const Clock& clock,
                                           const std::string& toml, const Options& options) {
   if (options.state_dir.empty()) return nullptr;
-  auto store = std::make_unique<StateStore>(options.state_dir, service.name);
+  auto store =
+      std::make_unique<StateStore>(options.state_dir, service.name, StateStore::Saving::kBeside);
 
   if (!hosted->node().recover(*store)) {
     // The stage may be half loaded: a new one.

@@ -15,7 +15,7 @@ std::optional<wire::Refusal> StateKeeper::append(std::string_view channel,
 }
 
 bool StateKeeper::is_due(std::int64_t now) {
-  if (store_ == nullptr || events_ == 0) return false;
+  if (store_ == nullptr || events_ == 0 || store_->is_saving()) return false;
   if (period_start_ < 0 || period_start_ > now) period_start_ = now;
 
   // After a failure (e.g. a full disk) it is tried again once a second, not at every event.
@@ -30,17 +30,37 @@ std::optional<wire::Refusal> StateKeeper::save(std::int64_t now,
                                                const std::function<std::string()>& make_state) {
   if (store_ == nullptr || now < 0) return std::nullopt;
   tried_utime_ = now;
-  is_failing_ = true;
+  saved_events_ = events_;
   try {
-    if (auto refusal = store_->save(make_state())) return refusal;
+    if (auto refusal = store_->save(make_state())) {
+      is_failing_ = true;
+      return refusal;
+    }
   } catch (const std::exception& error) {
+    is_failing_ = true;
     return wire::Refusal{wire::Reason::kStateNotKept, error.what()};
   }
 
-  resume(now);
-  events_ = 0;
-  is_failing_ = false;
+  if (!store_->is_saving()) kept();
   return std::nullopt;
+}
+
+std::optional<StateStore::Kept> StateKeeper::settle() {
+  if (store_ == nullptr) return std::nullopt;
+  auto end = store_->finished();
+  if (!end) return std::nullopt;
+  if (*end) {
+    is_failing_ = true;
+  } else {
+    kept();
+  }
+  return end;
+}
+
+void StateKeeper::kept() {
+  resume(tried_utime_);
+  events_ -= saved_events_;
+  is_failing_ = false;
 }
 
 std::int64_t StateKeeper::journal_bytes() const {

@@ -39,10 +39,12 @@ class StateKeeper {
                                       std::span<const std::uint8_t> bytes);
   /// Whether a snapshot should be saved now.
   bool is_due(std::int64_t now);
-  /// Saves what `make_state` gives. Without a store, or before the first message (now < 0), does
-  /// nothing. A refusal: the device fails, or `make_state` threw.
+  /// Saves what `make_state` gives, or begins to (StateStore::Saving). Without a store, or before
+  /// the first message (now < 0), does nothing. A refusal: the device fails, or `make_state` threw.
   std::optional<wire::Refusal> save(std::int64_t now,
                                     const std::function<std::string()>& make_state);
+  /// The end of a snapshot that was written beside, once.
+  std::optional<StateStore::Kept> settle();
 
   /// Whether something could not be kept, and no snapshot has made up for it yet.
   bool is_failing() const { return is_failing_; }
@@ -52,13 +54,16 @@ class StateKeeper {
   std::int64_t journal_bytes() const;
 
  private:
+  void kept();
+
   std::int64_t every_us_;
   int every_events_;
   StateStore* store_ = nullptr;
   std::int64_t saved_utime_ = -1;
   std::int64_t tried_utime_ = -1;
   std::int64_t period_start_ = -1;
-  int events_ = 0;  // since the snapshot
+  int events_ = 0;        // since the snapshot
+  int saved_events_ = 0;  // of them before the one that is being written
   bool is_failing_ = false;
 };
 

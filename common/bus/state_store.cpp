@@ -5,9 +5,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
+#include <chrono>
 #include <cstring>
+#include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -26,7 +31,8 @@ constexpr int kOwn = O_NOFOLLOW | O_CLOEXEC;
 constexpr int kAttemptsWithJournal = 2;
 constexpr int kAttemptsWithSnapshot = 4;
 
-/// None where there is no file, or a symbolic link: state is never read or written through one.
+/// None where there is no file that can be read, or a symbolic link: state is never read or written
+/// through one.
 std::optional<std::string> read_file(const fs::path& file) {
   const int in = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (in < 0) return std::nullopt;
@@ -37,6 +43,7 @@ std::optional<std::string> read_file(const fs::path& file) {
     if (got > 0) text.append(bytes.data(), static_cast<std::size_t>(got));
   }
   ::close(in);
+  if (got < 0 && text.empty()) return std::nullopt;
   return text;
 }
 
@@ -76,10 +83,11 @@ std::optional<wire::Refusal> replace_file(const fs::path& file, std::string_view
 
 }  // namespace
 
-StateStore::StateStore(fs::path directory, std::string name)
-    : directory_(std::move(directory)), name_(std::move(name)) {}
+StateStore::StateStore(fs::path directory, std::string name, Saving saving)
+    : directory_(std::move(directory)), name_(std::move(name)), saving_(saving) {}
 
 StateStore::~StateStore() {
+  if (writing_.valid()) writing_.wait();
   if (journal_ >= 0) ::close(journal_);
   if (lock_ >= 0) ::close(lock_);
 }
@@ -137,13 +145,7 @@ void StateStore::refuse_what_killed_before(Recovered& recovered) {
   }
 
   if (attempts >= kAttemptsWithJournal) {
-    std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(directory_, ignored)) {
-      const std::string file = entry.path().filename().string();
-      if (file.starts_with(name_ + ".journal.") && !file.ends_with(".damaged")) {
-        put_aside(entry.path());
-      }
-    }
+    for (const std::uint64_t number : journals()) put_aside(journal_path(number));
     recovered.problems.push_back(
         {wire::Reason::kJournalDamaged, directory_.string() + ": recovery with the journal died " +
                                             std::to_string(attempts) + " times, put aside"});
@@ -173,27 +175,34 @@ StateStore::Recovered StateStore::open() {
     }
   }
 
-  std::uint64_t valid_bytes = 0;
-  const auto journal = read_file(journal_path(generation_));
-
   // Events that followed a lost snapshot mean nothing without it; only journal 0 starts at nothing.
-  if (journal && !snapshot_is_lost) {
-    JournalContent content = decode_journal(*journal);
-    valid_bytes = content.valid_bytes;
-    recovered.events = std::move(content.events);
-    if (content.is_damaged) {
-      recovered.problems.push_back({wire::Reason::kJournalDamaged,
-                                    journal_path(generation_).string() + ": damaged behind byte " +
-                                        std::to_string(valid_bytes) + "; going on with the " +
-                                        std::to_string(recovered.events.size()) +
-                                        " events before"});
-    }
-  }
-
-  remove_other_journals();
+  const std::uint64_t first = generation_;
+  const std::uint64_t valid_bytes = snapshot_is_lost ? 0 : take_journals(recovered);
+  keep_journals(first, generation_);
   if (auto refusal = open_journal(valid_bytes)) recovered.problems.push_back(*refusal);
-
   return recovered;
+}
+
+/// The events of journal generation_ and those that follow it without a hole; generation_ is then
+/// the last of them, of which so many bytes are whole.
+std::uint64_t StateStore::take_journals(Recovered& recovered) {
+  std::uint64_t valid_bytes = 0;
+  for (std::uint64_t number = generation_;; ++number) {
+    const auto journal = read_file(journal_path(number));
+    if (!journal) return valid_bytes;
+    JournalContent content = decode_journal(*journal);
+    generation_ = number;
+    valid_bytes = content.valid_bytes;
+    std::ranges::move(content.events, std::back_inserter(recovered.events));
+    if (content.is_damaged) {
+      recovered.problems.push_back(
+          {wire::Reason::kJournalDamaged, journal_path(number).string() + ": damaged behind byte " +
+                                              std::to_string(valid_bytes) + "; going on with the " +
+                                              std::to_string(recovered.events.size()) +
+                                              " events before"});
+    }
+    if (content.is_damaged || content.is_torn) return valid_bytes;
+  }
 }
 
 std::optional<wire::Refusal> StateStore::open_journal(std::uint64_t valid_bytes) {
@@ -206,13 +215,26 @@ std::optional<wire::Refusal> StateStore::open_journal(std::uint64_t valid_bytes)
   return std::nullopt;
 }
 
-void StateStore::remove_other_journals() {
+/// Numbers of the journals that are there.
+std::vector<std::uint64_t> StateStore::journals() const {
+  const std::string begin = name_ + ".journal.";
+  std::vector<std::uint64_t> numbers;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(directory_, ignored)) {
     const std::string file = entry.path().filename().string();
-    const bool is_journal = file.starts_with(name_ + ".journal.") && !file.ends_with(".damaged");
-    if (is_journal && entry.path() != journal_path(generation_)) fs::remove(entry.path(), ignored);
+    if (!file.starts_with(begin)) continue;
+    const char* const end = file.data() + file.size();
+    std::uint64_t number = 0;
+    const auto read = std::from_chars(file.data() + begin.size(), end, number);
+    if (read.ec == std::errc() && read.ptr == end) numbers.push_back(number);
   }
+  return numbers;
+}
+
+void StateStore::keep_journals(std::uint64_t first, std::uint64_t last) const {
+  std::error_code ignored;
+  for (const std::uint64_t number : journals())
+    if (number < first || number > last) fs::remove(journal_path(number), ignored);
 }
 
 void StateStore::end_recovery() { ::unlink(path(".recovering").c_str()); }
@@ -220,9 +242,8 @@ void StateStore::end_recovery() { ::unlink(path(".recovering").c_str()); }
 void StateStore::start_over() {
   lock();
   put_aside(path(".snapshot"));
-  put_aside(journal_path(generation_));
+  for (const std::uint64_t number : journals()) put_aside(journal_path(number));
   generation_ = 0;
-  remove_other_journals();
   open_journal(0);
 }
 
@@ -242,16 +263,46 @@ std::optional<wire::Refusal> StateStore::append(std::string_view channel,
   return std::nullopt;
 }
 
-std::optional<wire::Refusal> StateStore::save(std::string_view state) {
+std::optional<wire::Refusal> StateStore::save(std::string state) {
   lock();  // Where the directory could not be made before, it may be possible now.
-  if (auto refusal = replace_file(path(".snapshot"), encode_snapshot(generation_ + 1, state))) {
+  if (writing_.valid()) ended(writing_.get());
+
+  // What comes from here on follows the new snapshot, and the one before as well until the new one
+  // is on the device. Behind a hole nothing follows the one before.
+  const std::uint64_t before = generation_;
+  if (is_behind_hole_) ::unlink(journal_path(before).c_str());
+  is_behind_hole_ = is_behind_hole_ || journal_broken_;
+  generation_ = before + (journal_broken_ ? 2 : 1);
+  if (auto refusal = open_journal(0)) {
+    generation_ = before;
     return refusal;
   }
-  const fs::path old = journal_path(generation_);
-  ++generation_;
-  auto refusal = open_journal(0);
-  ::unlink(old.c_str());
-  return refusal;
+
+  if (saving_ == Saving::kAtOnce) return ended(write_snapshot(generation_, state));
+  writing_ = std::async(std::launch::async, [this, number = generation_, state = std::move(state)] {
+    return write_snapshot(number, state);
+  });
+  return std::nullopt;
+}
+
+/// Reads nothing that changes: it may run beside the rest.
+StateStore::Kept StateStore::write_snapshot(std::uint64_t generation,
+                                            const std::string& state) const {
+  if (auto refusal = replace_file(path(".snapshot"), encode_snapshot(generation, state)))
+    return refusal;
+  keep_journals(generation, std::numeric_limits<std::uint64_t>::max());
+  return std::nullopt;
+}
+
+StateStore::Kept StateStore::ended(Kept kept) {
+  if (!kept) is_behind_hole_ = false;
+  return kept;
+}
+
+std::optional<StateStore::Kept> StateStore::finished() {
+  if (!writing_.valid()) return std::nullopt;
+  if (writing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
+  return ended(writing_.get());
 }
 
 }  // namespace understory::bus

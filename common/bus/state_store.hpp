@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <optional>
 #include <span>
 #include <string>
@@ -26,11 +27,19 @@ struct JournalEvent {
 ///
 /// A snapshot is written whole or not at all (temporary file, flushed, renamed), with a checksum.
 /// An event is one write(), so what a killed process leaves behind is whole events and at most one
-/// torn one at the end.
+/// torn one at the end. Inputs that come while a snapshot is written go into the next journal:
+/// G, G + 1, ... together are what came since snapshot G. A number that is left out is a hole.
 class StateStore {
  public:
+  /// Who waits for the device while a snapshot is flushed: the caller of save(), or a thread beside
+  /// it. A slow device takes seconds.
+  enum class Saving : std::uint8_t { kAtOnce, kBeside };
+  /// How a snapshot ended: none = it is kept.
+  using Kept = std::optional<wire::Refusal>;
+
   /// `name`: the service's. Touches no file before open() or start_over().
-  StateStore(std::filesystem::path directory, std::string name);
+  StateStore(std::filesystem::path directory, std::string name, Saving saving = Saving::kAtOnce);
+  /// Waits for the snapshot that is being written.
   ~StateStore();
   StateStore(const StateStore&) = delete;
   StateStore& operator=(const StateStore&) = delete;
@@ -55,9 +64,14 @@ class StateStore {
   /// device fails; needs_snapshot() is then true.
   std::optional<wire::Refusal> append(std::string_view channel,
                                       std::span<const std::uint8_t> bytes);
-  /// Writes a snapshot, which replaces the one before and its journal. Refused as kStateNotKept
-  /// where the device fails; the one before then stays. Throws as open() does.
-  std::optional<wire::Refusal> save(std::string_view state);
+  /// Writes a snapshot, which replaces the one before and its journals; waits for one that is being
+  /// written. Refused as kStateNotKept where the device fails; the one before then stays. With
+  /// kBeside the end is told by finished(). Throws as open() does.
+  std::optional<wire::Refusal> save(std::string state);
+  /// Whether a snapshot is being written beside.
+  bool is_saving() const { return writing_.valid(); }
+  /// The end of a snapshot that was written beside, once: kept or refused. None before.
+  std::optional<Kept> finished();
 
   /// True after a failed append: the journal has a hole, only a snapshot makes the state whole.
   bool needs_snapshot() const { return journal_broken_; }
@@ -74,16 +88,23 @@ class StateStore {
   std::filesystem::path journal_path(std::uint64_t generation) const;
   void put_aside(const std::filesystem::path& file);
   void refuse_what_killed_before(Recovered& recovered);
+  std::uint64_t take_journals(Recovered& recovered);
   std::optional<wire::Refusal> open_journal(std::uint64_t valid_bytes);
-  void remove_other_journals();
+  std::vector<std::uint64_t> journals() const;
+  void keep_journals(std::uint64_t first, std::uint64_t last) const;
+  Kept ended(Kept kept);
+  Kept write_snapshot(std::uint64_t generation, const std::string& state) const;
 
   std::filesystem::path directory_;
   std::string name_;
-  std::uint64_t generation_ = 0;
+  Saving saving_;
+  std::uint64_t generation_ = 0;  ///< Of the journal that is written.
+  std::future<Kept> writing_;     ///< Valid while a snapshot is written beside.
   int journal_ = -1;
   int lock_ = -1;
   std::uint64_t journal_bytes_ = 0;
   bool journal_broken_ = false;
+  bool is_behind_hole_ = false;  ///< The journal follows a hole; only a snapshot makes up for it.
 };
 
 }  // namespace understory::bus

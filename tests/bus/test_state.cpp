@@ -1,12 +1,17 @@
 // State over restarts: snapshot and journal, cut and damaged everywhere.
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <limits>
 #include <random>
+#include <thread>
 
 #include "common/bus/memory_bus.hpp"
 #include "common/bus/node_state.hpp"
@@ -33,8 +38,9 @@ void write(const fs::path& file, const std::string& bytes) {
 /// One life of the toy: recovers, takes inputs [from, to), is killed (nothing is saved at the end).
 struct Life {
   explicit Life(const fs::path& directory, const std::string& toml = "",
-                const Clock& clock = no_clock())
-      : hosted(test::toy_service(), bus, clock, toml, "toy.toml"), store(directory, "toy") {
+                const Clock& clock = no_clock(),
+                StateStore::Saving saving = StateStore::Saving::kAtOnce)
+      : hosted(test::toy_service(), bus, clock, toml, "toy.toml"), store(directory, "toy", saving) {
     bus.subscribe("RAW_POSE", 0, [this](const BusMessage& message) {
       poses.push_back(*wire::decode_message<raw_pose_t>(message.bytes));
     });
@@ -83,6 +89,81 @@ TEST_CASE("a killed service goes on as if nothing had happened, whenever it is k
             wire::encode_bytes(expected[static_cast<std::size_t>(killed) + i]));
     }
   }
+}
+
+TEST_CASE("a device that takes long to flush keeps no input waiting, and nothing is lost") {
+  const auto expected = uninterrupted(60);
+  const test::Scratch scratch("state-slow");
+  // Whoever opens it to write waits until somebody reads: a device that hangs.
+  const fs::path slow = scratch.path() / "toy.snapshot.new";
+  REQUIRE(::mkfifo(slow.c_str(), 0600) == 0);
+  Life life(scratch.path(), "[runtime]\nsnapshot_every_events = 5\n", no_clock(),
+            StateStore::Saving::kBeside);
+  life.run(0, 23);
+  CHECK(life.poses.size() == 23);
+  CHECK(life.store.is_saving());
+  CHECK_FALSE(fs::exists(scratch.path() / "toy.snapshot"));
+
+  // Killed now: what the process would leave behind.
+  const test::Scratch left("state-slow-left");
+  for (const char* const file : {"toy.journal.0", "toy.journal.1"})
+    fs::copy(scratch.path() / file, left.path() / file);
+  Life second(left.path());
+  CHECK(second.is_recovered);
+  second.run(23, 60);
+  REQUIRE(second.poses.size() == 37);
+  CHECK(wire::encode_bytes(second.poses.back()) == wire::encode_bytes(expected.back()));
+
+  // The device answers, with an error: a pipe cannot be flushed. The next snapshot is kept.
+  std::ifstream(slow, std::ios::binary).ignore(std::numeric_limits<std::streamsize>::max());
+  for (int i = 23; i < 60 || !fs::exists(scratch.path() / "toy.snapshot"); ++i) {
+    REQUIRE(i < 6000);
+    life.run(i, i + 1);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  CHECK(life.hosted.node().monitor().count_of("", wire::Reason::kStateNotKept) == 1);
+  CHECK_FALSE(fs::exists(scratch.path() / "toy.journal.0"));
+}
+
+TEST_CASE("what follows a hole in the journal is not repeated") {
+  const test::Scratch scratch("state-hole");
+  const auto channels = [&] {
+    const test::Scratch copy("state-hole-copy");
+    fs::copy(scratch.path(), copy.path(), fs::copy_options::recursive);
+    StateStore store(copy.path(), "toy");
+    std::string all;
+    for (const JournalEvent& event : store.open().events) all += event.channel;
+    return all;
+  };
+  const std::array<std::uint8_t, 1> bytes{1};
+  StateStore store(scratch.path(), "toy");
+  store.open();
+  store.end_recovery();
+  REQUIRE_FALSE(store.append("A", bytes));
+
+  // The device fails: no further journal can be made.
+  fs::create_directory(scratch.path() / "toy.journal.1");
+  CHECK(store.save("state"));
+  CHECK(store.needs_snapshot());
+  CHECK(store.append("B", bytes));
+  CHECK(channels() == "A");
+
+  // Journals can be made again, snapshots cannot.
+  fs::create_directory(scratch.path() / "toy.snapshot.new");
+  CHECK(store.save("state"));
+  CHECK_FALSE(store.append("C", bytes));
+  CHECK(channels() == "A");
+  for (int i = 0; i < 20; ++i) CHECK(store.save("state"));
+  CHECK_FALSE(store.append("D", bytes));
+  CHECK(channels() == "A");
+  const auto files = std::distance(fs::directory_iterator(scratch.path()), {});
+  CHECK(files <= 5);  // lock, the folder in the way, journals of before and of now
+
+  // All is well again.
+  fs::remove(scratch.path() / "toy.snapshot.new");
+  CHECK_FALSE(store.save("state"));
+  CHECK_FALSE(store.append("E", bytes));
+  CHECK(channels() == "E");
 }
 
 TEST_CASE("a journal cut at every byte gives every whole event before the cut") {
