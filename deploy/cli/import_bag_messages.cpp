@@ -15,6 +15,8 @@ namespace {
 
 /// Below it a steering angle is noise [m/s].
 constexpr double kSlow_mps = 0.1;
+/// A faster turn at such a speed is more than noise [rad/s].
+constexpr double kTurning_rad_s = 0.02;
 constexpr double kMoved_m = 1.0;
 
 /// Hesai's drivers have x to the right and y ahead where the decoder has x ahead and y to the left.
@@ -177,8 +179,7 @@ void BagMessages::take_odometry(const bag::Message& message) {
     throw io::DataError("a velocity that is no number");
   const auto [velocity_mps, vehicle_rate_rad_s] =
       on_vehicle(odometry, bag::is_twist_type(type) ? pose.header.frame : pose.child_frame);
-  double speed_mps = velocity_mps.x();
-  double rate_rad_s = vehicle_rate_rad_s.z();
+  PlanarMotion motion{velocity_mps.x(), velocity_mps.y(), vehicle_rate_rad_s.z()};
   fastest_mps_ = std::max(fastest_mps_, odometry.velocity_mps.norm());
   if (!first_position_m_) first_position_m_ = pose.pose.translation();
   farthest_m_ = std::max(farthest_m_, (pose.pose.translation() - *first_position_m_).norm());
@@ -188,16 +189,24 @@ void BagMessages::take_odometry(const bag::Message& message) {
     const double seconds =
         last ? 1e-9 * static_cast<double>(pose.header.stamp_ns - last->header.stamp_ns) : 0.0;
     if (seconds <= 0.0) return;
-    const Eigen::Isometry3d motion = last->pose.inverse() * pose.pose;
-    speed_mps = motion.translation().x() / seconds;
-    rate_rad_s = yaw_of(motion) / seconds;
+    const Eigen::Isometry3d moved = last->pose.inverse() * pose.pose;
+    motion = {moved.translation().x() / seconds, moved.translation().y() / seconds,
+              yaw_of(moved) / seconds};
   }
+  add_wheels(motion, utime_of(pose.header, message.topic));
+}
 
+/// Speed and steering of a car: what no car can do is counted.
+void BagMessages::add_wheels(const PlanarMotion& motion, model::Utime utime) {
   model::WheelSample wheels;
-  wheels.utime = utime_of(pose.header, message.topic);
-  wheels.speed_mps = speed_mps;
-  if (std::abs(speed_mps) > kSlow_mps)
-    wheels.steering_rad = std::atan(conversion_.wheelbase_m * rate_rad_s / speed_mps);
+  wheels.utime = utime;
+  wheels.speed_mps = motion.forward_mps;
+  const bool is_slow = std::abs(motion.forward_mps) <= kSlow_mps;
+  if (!is_slow)
+    wheels.steering_rad =
+        std::atan(conversion_.wheelbase_m * motion.rate_rad_s / motion.forward_mps);
+  if (is_slow && std::abs(motion.rate_rad_s) > kTurning_rad_s) ++turns_on_the_spot_;
+  if (std::abs(motion.left_mps) > kSlow_mps) ++sideways_;
   log_.add("RAW_WHEELS", wheels, wheels.utime);
 }
 
@@ -273,6 +282,18 @@ std::vector<std::string> BagMessages::remarks() const {
     lines.push_back(
         fmt::format("the velocity is taken as the vehicle's, though it is that of {}: {}",
                     twist_frame_, mounts_.missing(twist_frame_)));
+  const auto left_out = [&](std::uint64_t count, const std::string& what) {
+    if (count > 0)
+      lines.push_back(fmt::format("{}: {} of {} messages {}", bag_.topics()[*choice_.odometry].name,
+                                  count, numbers_[*choice_.odometry], what));
+  };
+  left_out(turns_on_the_spot_,
+           fmt::format("turn by more than {} rad/s at {} m/s or less: RAW_WHEELS has speed and "
+                       "steering, so this yaw rate is left out (an IMU measures it)",
+                       kTurning_rad_s, kSlow_mps));
+  left_out(sideways_, fmt::format("move sideways by more than {} m/s: RAW_WHEELS has the forward "
+                                  "speed alone",
+                                  kSlow_mps));
   if (log_.late() > 0)
     lines.push_back(
         fmt::format("{} messages have stamps more than 1 s behind others: do the clocks "

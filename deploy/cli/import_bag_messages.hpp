@@ -48,6 +48,12 @@ class BagMessages {
   std::vector<std::string> remarks() const;
 
  private:
+  /// Of the vehicle's origin, frame `vehicle`.
+  struct PlanarMotion {
+    double forward_mps = 0.0;
+    double left_mps = 0.0;
+    double rate_rad_s = 0.0;
+  };
   void convert(const bag::Message& message);
   void take_cloud(const bag::Message& message);
   void take_packets(const bag::Message& message);
@@ -57,6 +63,7 @@ class BagMessages {
   void take_scan(const bag::Message& message);
   void take_imu(const bag::Message& message);
   void take_odometry(const bag::Message& message);
+  void add_wheels(const PlanarMotion& motion, model::Utime utime);
   std::pair<Eigen::Vector3d, Eigen::Vector3d> on_vehicle(const bag::Odometry& odometry,
                                                          const std::string& frame);
   void take_fix(const bag::Message& message);
@@ -83,6 +90,8 @@ class BagMessages {
   std::string twist_frame_;             ///< Of a twist, where nothing joins it to the vehicle.
   double farthest_m_ = 0.0;             ///< From the first pose of odometry.
   double fastest_mps_ = 0.0;
+  std::uint64_t turns_on_the_spot_ = 0;  ///< Messages of odometry.
+  std::uint64_t sideways_ = 0;
   std::optional<Eigen::Vector3d> first_position_m_;
 };
 

@@ -278,6 +278,42 @@ TEST_CASE("import bag: the velocity of a frame becomes that of the vehicle", "[i
   }
 }
 
+TEST_CASE("import bag: turns on the spot and sideways motion, which no car makes, are told",
+          "[import]") {
+  const BagFolder folder;
+  const Serialisation cdr{bag::Encoding::kCdr, false};
+  std::vector<Recorded> messages;
+  const auto drive = [&](std::int64_t count, const Eigen::Vector3d& velocity_mps, double rate) {
+    for (std::int64_t i = 0; i < count; ++i) {
+      const std::int64_t now = kStart_ns + static_cast<std::int64_t>(messages.size()) * 100'000'000;
+      bag::Odometry odometry;
+      odometry.pose.header = {now, "base_link"};
+      odometry.velocity_mps = velocity_mps;
+      odometry.angular_rate_rad_s.z() = rate;
+      messages.push_back(
+          {"/twist", "geometry_msgs/TwistStamped", now, twist_message(cdr, odometry, false)});
+    }
+  };
+  // Standstill with the gyro's noise, and a curve with slip: as a car drives.
+  drive(2, {0.0, 0.0, 0.0}, 0.01);
+  drive(3, {5.0, 0.05, 0.0}, 0.3);
+  const auto remarks = [&] {
+    const std::string bag = folder.write({BagForm::Kind::kMcap}, messages);
+    const Outcome outcome = folder.import(bag, "--odometry /twist --out " + folder.path("run.lcm"));
+    REQUIRE(outcome.status == 0);
+    return outcome.error;
+  };
+  CHECK(remarks().empty());
+
+  drive(4, {0.0, 0.0, 0.0}, -0.5);
+  drive(5, {0.0, 1.0, 0.0}, 0.0);
+  drive(6, {0.05, -1.0, 0.0}, 0.5);
+  const std::string said = remarks();
+  CHECK_THAT(said, Contains("/twist: 10 of 20 messages turn by more than 0.02 rad/s at 0.1 m/s"));
+  CHECK_THAT(said, Contains("/twist: 11 of 20 messages move sideways by more than 0.1 m/s"));
+  CHECK(channels_of(folder.path("run.lcm"))["RAW_WHEELS"].size() == 20);
+}
+
 TEST_CASE("import bag: packets of Ouster's drivers, with the metadata of the bag", "[import]") {
   const BagFolder folder;
   std::mt19937_64 random(8);
