@@ -1,6 +1,8 @@
 #include "common/bag/messages.hpp"
 
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "common/io/data_error.hpp"
 #include "common/io/velodyne.hpp"
@@ -31,21 +33,25 @@ Eigen::Vector3d read_vector(MessageReader& reader) {
   return {x, y, z};
 }
 
-Eigen::Isometry3d read_motion(MessageReader& reader) {
+/// None where the numbers are no pose.
+std::optional<Eigen::Isometry3d> read_any_motion(MessageReader& reader) {
   const Eigen::Vector3d position = read_vector(reader);
   const Eigen::Vector3d axis = read_vector(reader);
   Eigen::Quaterniond rotation(reader.number<double>(), axis.x(), axis.y(), axis.z());
   const double norm = rotation.norm();
   // A quaternion of zeros is what drivers send that know no rotation.
-  if (norm == 0.0) {
-    rotation = Eigen::Quaterniond::Identity();
-  } else if (!position.allFinite() || !(std::abs(norm - 1.0) < 0.1)) {
-    throw io::DataError("a pose whose numbers are no pose");
-  }
+  if (norm == 0.0) rotation = Eigen::Quaterniond::Identity();
+  if (!position.allFinite() || !(norm == 0.0 || std::abs(norm - 1.0) < 0.1)) return std::nullopt;
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   motion.linear() = rotation.normalized().toRotationMatrix();
   motion.translation() = position;
   return motion;
+}
+
+Eigen::Isometry3d read_motion(MessageReader& reader) {
+  const auto motion = read_any_motion(reader);
+  if (!motion) throw io::DataError("a pose whose numbers are no pose");
+  return *motion;
 }
 
 constexpr std::size_t kCovariance3 = 9;
@@ -256,7 +262,12 @@ std::vector<Pose> read_transforms(MessageReader& reader) {
   for (Pose& transform : transforms) {
     transform.header = read_header(reader);
     transform.child_frame = read_frame(reader);
-    transform.pose = read_motion(reader);
+    const auto motion = read_any_motion(reader);
+    if (motion) {
+      transform.pose = *motion;
+    } else {
+      transform.pose.translation().setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
   }
   return transforms;
 }

@@ -128,7 +128,8 @@ PacketScan read_packets(const MessageReader& message, const std::string& type);
 bool is_packet_type(const std::string& type);
 /// Whether it is PacketMsg of one of Ouster's drivers.
 bool is_ouster_packet_type(const std::string& type);
-/// tf2_msgs/TFMessage.
+/// tf2_msgs/TFMessage. A transform whose numbers are no pose has a NaN position; the others of the
+/// message stay.
 std::vector<Pose> read_transforms(MessageReader& reader);
 /// A message of a pose type.
 Pose read_pose(MessageReader& reader, const std::string& type);

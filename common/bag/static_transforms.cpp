@@ -1,33 +1,62 @@
 #include "common/bag/static_transforms.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <set>
+#include <cmath>
+#include <numbers>
 
 namespace understory::bag {
+namespace {
+
+std::string text_of(const std::string& parent, const Eigen::Isometry3d& parent_T_child) {
+  const Eigen::Vector3d& p = parent_T_child.translation();
+  const Eigen::Matrix3d& r = parent_T_child.linear();
+  const auto degrees = [](double radians) { return radians * 180.0 / std::numbers::pi + 0.0; };
+  return fmt::format("in {} at ({:.3f}, {:.3f}, {:.3f}) m, roll {:.2f} pitch {:.2f} yaw {:.2f} deg",
+                     parent, p.x(), p.y(), p.z(), degrees(std::atan2(r(2, 1), r(2, 2))),
+                     degrees(std::asin(std::clamp(-r(2, 0), -1.0, 1.0))),
+                     degrees(std::atan2(r(1, 0), r(0, 0))));
+}
+
+}  // namespace
+
+bool StaticTransforms::is_same(const Link& a, const Link& b) {
+  constexpr double kMoved_m = 1e-3;
+  constexpr double kTurned_rad = 1e-4;
+  const Eigen::Isometry3d apart = a.parent_T_child.inverse() * b.parent_T_child;
+  return a.parent == b.parent && apart.translation().norm() <= kMoved_m &&
+         Eigen::AngleAxisd(apart.linear()).angle() <= kTurned_rad;
+}
+
+bool StaticTransforms::admits(const Pose& parent_T_child) {
+  const std::string& child = parent_T_child.child_frame;
+  if (child.empty() || child == parent_T_child.header.frame) return false;
+  if (parent_T_child.pose.translation().allFinite()) return true;
+  unusable_.insert(fmt::format("{} in {}: a transform whose numbers are no pose is left out", child,
+                               parent_T_child.header.frame));
+  return false;
+}
 
 void StaticTransforms::add(const Pose& parent_T_child) {
-  if (parent_T_child.child_frame.empty() ||
-      parent_T_child.child_frame == parent_T_child.header.frame)
-    return;
-  links_[parent_T_child.child_frame] = {parent_T_child.header.frame, parent_T_child.pose};
+  if (!admits(parent_T_child)) return;
+  const std::string& child = parent_T_child.child_frame;
+  const Link link{parent_T_child.header.frame, parent_T_child.pose};
+  const auto [entry, is_new] = links_.try_emplace(child, link);
+  if (is_new) return;
+  if (!is_same(entry->second, link))
+    replaced_[child] =
+        fmt::format("{}: two static transforms, {} and later {}: the later one counts", child,
+                    text_of(entry->second.parent, entry->second.parent_T_child),
+                    text_of(link.parent, link.parent_T_child));
+  entry->second = link;
 }
 
 void StaticTransforms::watch(const Pose& parent_T_child) {
-  if (parent_T_child.child_frame.empty() ||
-      parent_T_child.child_frame == parent_T_child.header.frame)
-    return;
-  constexpr double kMoved_m = 1e-3;
-  constexpr double kTurned_rad = 1e-4;
-  const auto [entry, is_new] = watched_.try_emplace(
-      parent_T_child.child_frame, Watched{{parent_T_child.header.frame, parent_T_child.pose}});
-  if (is_new) return;
-  const Eigen::Isometry3d apart =
-      entry->second.first.parent_T_child.inverse() * parent_T_child.pose;
-  // A NaN is no place either.
-  const bool is_same = parent_T_child.header.frame == entry->second.first.parent &&
-                       apart.translation().norm() <= kMoved_m &&
-                       Eigen::AngleAxisd(apart.linear()).angle() <= kTurned_rad;
-  entry->second.has_moved |= !is_same;
+  if (!admits(parent_T_child)) return;
+  const Link link{parent_T_child.header.frame, parent_T_child.pose};
+  const auto [entry, is_new] = watched_.try_emplace(parent_T_child.child_frame, Watched{link});
+  if (!is_new) entry->second.has_moved |= !is_same(entry->second.first, link);
 }
 
 std::size_t StaticTransforms::take_watched() {
@@ -74,6 +103,12 @@ std::vector<std::string> StaticTransforms::frames() const {
     names.insert(link.parent);
   }
   return {names.begin(), names.end()};
+}
+
+std::vector<std::string> StaticTransforms::remarks() const {
+  std::vector<std::string> lines(unusable_.begin(), unusable_.end());
+  for (const auto& [child, line] : replaced_) lines.push_back(line);
+  return lines;
 }
 
 }  // namespace understory::bag

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,8 @@ namespace understory::bag {
 /// A tree of frames that do not move against each other.
 class StaticTransforms {
  public:
-  /// A transform; a later one of the same child replaces it.
+  /// A transform; a later one of the same child replaces it. One with a position that is no number
+  /// is left out.
   void add(const Pose& parent_T_child);
   /// A transform that is sent again and again (/tf): it counts where it stays the same in all of
   /// the recording (1 mm, 0.1 mrad) and add() has none of its child.
@@ -27,6 +29,9 @@ class StaticTransforms {
   bool has(const std::string& frame) const;
   /// All frames.
   std::vector<std::string> frames() const;
+  /// A line for each transform that was left out, and for each frame with two places (1 mm, 0.1
+  /// mrad), of which the later one counts.
+  std::vector<std::string> remarks() const;
 
  private:
   struct Link {
@@ -40,9 +45,14 @@ class StaticTransforms {
     Link first;
     bool has_moved = false;
   };
+  static bool is_same(const Link& a, const Link& b);
+  /// Whether the transform can be used; a remark where it cannot.
+  bool admits(const Pose& parent_T_child);
 
   std::map<std::string, Link> links_;  ///< By child.
   std::map<std::string, Watched> watched_;
+  std::set<std::string> unusable_;               ///< Remarks.
+  std::map<std::string, std::string> replaced_;  ///< Remarks by child, of its last change.
 };
 
 }  // namespace understory::bag

@@ -124,6 +124,17 @@ bool has_packets(const bag::Bag& bag, const std::optional<std::size_t>& topic) {
   return topic && bag::is_packet_type(bag.topics()[*topic].type);
 }
 
+/// What is wrong with the transforms, by which mounts may be missing.
+std::vector<std::string> transform_remarks(const bag::Bag& bag, const bag::Survey& survey) {
+  std::vector<std::string> lines = survey.transforms.remarks();
+  for (std::size_t i = 0; i < bag.topics().size(); ++i) {
+    const bag::Topic& topic = bag.topics()[i];
+    if (role_of(topic) == bag::Role::kTransforms && !survey.topics[i].fault.empty())
+      lines.push_back(fmt::format("{}: {}", topic.name, survey.topics[i].fault));
+  }
+  return lines;
+}
+
 void import_chosen(const BagImportOptions& options, bag::Bag& bag, const bag::Survey& survey,
                    const BagMounts& mounts) {
   const BagChoice choice = choose_bag_topics(bag.topics(), options.topics);
@@ -137,6 +148,7 @@ void import_chosen(const BagImportOptions& options, bag::Bag& bag, const bag::Su
   conversion.by_reception = topics_named(bag, options.receive_time);
   std::vector<std::string> remarks = bag.remarks();
   remarks.insert(remarks.end(), choice.remarks.begin(), choice.remarks.end());
+  for (std::string& line : transform_remarks(bag, survey)) remarks.push_back(std::move(line));
   std::vector<std::size_t> by_stamp;
   for (const std::size_t topic : choice.all()) {
     if (!conversion.by_reception.contains(topic)) by_stamp.push_back(topic);

@@ -165,6 +165,8 @@ void print_bag_list(const std::string& path, const bag::Bag& bag, const bag::Sur
     if (uses[i].starts_with("RAW_")) sensors.push_back(i);
   }
   print_mounts(bag, survey, mounts);
+  for (const std::string& line : survey.transforms.remarks())
+    fmt::print("mount: {}\n", terminal::printable(line));
   for (const std::string& line : clock_remarks(bag, survey, sensors))
     fmt::print("clock: {}\n", terminal::printable(line));
   for (const std::string& line : bag.remarks()) fmt::print("{}\n", terminal::printable(line));

@@ -190,6 +190,35 @@ TEST_CASE("import bag: mounts that /tf repeats, speed of a twist", "[import]") {
                  "geometry_msgs/TwistStamped has no pose");
 }
 
+TEST_CASE("import bag: a transform that is none costs no other one, two values are both told",
+          "[import]") {
+  const BagFolder folder;
+  const Serialisation cdr{bag::Encoding::kCdr, false};
+  bag::Pose broken = frame_in("base_link", "camera", place(1.0, 2.0, 3.0));
+  broken.pose.translation().y() = std::nan("");
+  const std::vector<bag::Pose> first{broken, frame_in("base_link", "imu", place(0.5, 0.0, 1.0)),
+                                     frame_in("base_link", "mast", place(0.0, 0.0, 1.0))};
+  // The same again is no contradiction.
+  const std::vector<bag::Pose> second{frame_in("base_link", "imu", place(0.7, 0.0, 1.0, 0.5)),
+                                      frame_in("base_link", "mast", place(0.0, 0.0, 1.0))};
+  const std::string bag = folder.write(
+      {BagForm::Kind::kMcap},
+      {{"/tf_static", "tf2_msgs/TFMessage", kStart_ns, transforms_message(cdr, first)},
+       {"/tf_static", "tf2_msgs/TFMessage", kStart_ns + 1, transforms_message(cdr, second)},
+       imu_at(kStart_ns + 2, kStart_ns + 2)});
+  const std::string of_camera = "camera in base_link: a transform whose numbers are no pose";
+  const std::string of_imu =
+      "imu: two static transforms, in base_link at (0.500, 0.000, 1.000) m, roll 0.00 pitch 0.00 "
+      "yaw 0.00 deg and later in base_link at (0.700, 0.000, 1.000) m, roll 0.00 pitch 0.00 yaw "
+      "28.65 deg: the later one counts";
+  CHECK_THAT(folder.import(bag, "--list").out, Contains(of_camera) && Contains(of_imu));
+  const Outcome outcome = folder.import(bag, "--out " + folder.path("run.lcm"));
+  REQUIRE(outcome.status == 0);
+  CHECK_THAT(outcome.out, Contains("x_m = 0.700000\nz_m = 1.000000\nyaw_rad = 0.500000"));
+  CHECK_THAT(outcome.error, Contains(of_camera) && Contains(of_imu));
+  CHECK(lines(outcome.error) == 2);
+}
+
 namespace {
 
 /// The sweeps and samples that the packets hold, as they must stand in the log.
