@@ -57,6 +57,15 @@ class Sender {
   int file_;
 };
 
+/// The ports of a driver's line "listens".
+inline std::vector<int> ports_in(const std::string& text) {
+  constexpr std::string_view kPort = " port ";
+  std::vector<int> ports;
+  for (auto at = text.find(kPort); at != std::string::npos; at = text.find(kPort, at + 1))
+    ports.push_back(std::atoi(text.c_str() + at + kPort.size()));
+  return ports;
+}
+
 class LiveDriver {
  public:
   /// `toml`: its configuration but for bind_address.
@@ -68,10 +77,7 @@ class LiveDriver {
     hosted_.node().connect();
     for (const log_t& line : log) {
       if (line.code != "listens") continue;
-      constexpr std::string_view kPort = " port ";
-      for (auto at = line.text.find(kPort); at != std::string::npos;
-           at = line.text.find(kPort, at + 1))
-        ports.push_back(std::atoi(line.text.c_str() + at + kPort.size()));
+      ports = ports_in(line.text);
     }
     REQUIRE(!ports.empty());
     for (const int port : ports) REQUIRE(port > 0);

@@ -1,76 +1,21 @@
 // The drivers of all makers through real sockets: what comes out must be what the import of a
 // capture gives, byte for byte, whatever else comes in.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <fstream>
 #include <random>
 
-#include "services/hesai_driver/adapter.hpp"
-#include "services/livox_driver/adapter.hpp"
-#include "services/ouster_driver/adapter.hpp"
-#include "tests/io/log_fixture.hpp"
-#include "tests/lidar_driver/live_driver.hpp"
-#include "tests/packets/made_up_sensor.hpp"
+#include "tests/lidar_driver/driver_family.hpp"
 
 using namespace understory;
 using namespace understory::test;
 
 namespace {
 
-model::Utime wall_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 /// Three makers; Velodyne's driver has tests of its own.
-struct Family {
-  MadeUpSensor sensor;
-  bus::Service service;
-  std::string toml;
-  std::vector<std::uint16_t> ports;  ///< Of the recording, in the order of the driver's.
-};
-
-struct DriverFixture {
-  TemporaryDirectory directory;
-
-  std::string file_of(const MadeUpSensor& sensor) {
-    const auto file = directory / (std::to_string(files_++) + sensor.description.source);
-    std::ofstream(file) << sensor.description.description;
-    return file.string();
-  }
-  Family family(const MadeUpSensor& sensor) {
-    const std::string& model = sensor.description.model;
-    if (model == "ouster")
-      return {
-          sensor,
-          ouster_driver::ouster_driver_service(),
-          "lidar_port = 0\nimu_port = 0\n[sensor]\nmetadata_file = \"" + file_of(sensor) + "\"\n",
-          {7502, 7503}};
-    if (const auto livox = packets::livox_model(model)) {
-      const packets::LivoxPorts ports = livox_ports(*livox);
-      return {sensor,
-              livox_driver::livox_driver_service(),
-              "points_port = 0\nimu_port = 0\n[sensor]\nmodel = \"" + model + "\"\n",
-              {ports.points, ports.imu}};
-    }
-    std::string toml = "data_port = 0\n[sensor]\nmodel = \"" + model + "\"\n";
-    if (!sensor.description.description.empty())
-      toml += "angle_file = \"" + file_of(sensor) + "\"\n";
-    return {sensor, hesai_driver::hesai_driver_service(), toml, {2368}};
-  }
-  std::vector<Family> families(const std::vector<MadeUpSensor>& sensors) {
-    std::vector<Family> all;
-    for (const MadeUpSensor& sensor : sensors) {
-      if (sensor.description.model != "vlp16") all.push_back(family(sensor));
-    }
-    return all;
-  }
-
- private:
-  int files_ = 0;
-};
+std::vector<Family> three_makers(DriverFixture& fixture, std::vector<MadeUpSensor> sensors) {
+  std::erase_if(sensors, [](const auto& one) { return one.description.model == "vlp16"; });
+  return fixture.families(sensors);
+}
 
 void send(LiveDriver& driver, const Family& family, const SentPacket& packet) {
   const auto port = std::ranges::find(family.ports, packet.port) - family.ports.begin();
@@ -79,39 +24,15 @@ void send(LiveDriver& driver, const Family& family, const SentPacket& packet) {
   if (port != 0) driver.settle();
 }
 
-/// What the import of a capture of these packets writes.
-struct Offline {
-  std::vector<Message> sweeps;
-  std::vector<Message> imu;
-};
-
-Offline import(const MadeUpSensor& sensor, const std::vector<SentPacket>& packets) {
-  packets::Decoder decoder = make_decoder(sensor.description);
-  Offline offline;
-  const auto write = [&](const model::PointSweep& sweep) {
-    for (model::PointSweep& part : split_sweep(sweep, 4000)) {
-      part.sequence = offline.sweeps.size();
-      offline.sweeps.push_back(wire::encode_message(part));
-    }
-  };
-  for (const SentPacket& packet : packets) {
-    const packets::Readings readings = add(decoder, {packet.bytes, packet.sent});
-    for (const auto& sweep : readings.sweeps) write(sweep);
-    for (const auto& sample : readings.imu) offline.imu.push_back(wire::encode_message(sample));
-  }
-  if (const auto sweep = finish(decoder)) write(*sweep);
-  return offline;
-}
-
 }  // namespace
 
 TEST_CASE("every driver publishes what an import gives, byte for byte", "[lidar_driver]") {
   std::mt19937_64 random(1);
   DriverFixture fixture;
-  for (const Family& family : fixture.families(made_up_sensors())) {
+  for (const Family& family : three_makers(fixture, made_up_sensors())) {
     CAPTURE(family.sensor.name);
     const MadeUpRecording recording = family.sensor.record(2, wall_us(), random);
-    LiveDriver driver(family.service, family.toml);
+    LiveDriver driver(family.service, family.toml());
     for (const SentPacket& packet : recording.packets) send(driver, family, packet);
     driver.finish();
     const Offline offline = import(family.sensor, recording.packets);
@@ -125,10 +46,10 @@ TEST_CASE("every driver publishes what an import gives, byte for byte", "[lidar_
 TEST_CASE("garbage and a second sensor are counted and change nothing", "[lidar_driver]") {
   std::mt19937_64 random(2);
   DriverFixture fixture;
-  for (const Family& family : fixture.families(one_of_each_family())) {
+  for (const Family& family : three_makers(fixture, one_of_each_family())) {
     CAPTURE(family.sensor.name);
     const MadeUpRecording recording = family.sensor.record(2, wall_us(), random);
-    LiveDriver driver(family.service, family.toml);
+    LiveDriver driver(family.service, family.toml());
     Sender other("127.0.0.2");
     std::int64_t garbage = 0;
     std::int64_t others = 0;
@@ -158,9 +79,9 @@ TEST_CASE("garbage and a second sensor are counted and change nothing", "[lidar_
 TEST_CASE("silence, lost packets and a foreign clock are reported", "[lidar_driver]") {
   std::mt19937_64 random(3);
   DriverFixture fixture;
-  for (const Family& family : fixture.families(one_of_each_family())) {
+  for (const Family& family : three_makers(fixture, one_of_each_family())) {
     CAPTURE(family.sensor.name);
-    LiveDriver driver(family.service, family.toml);
+    LiveDriver driver(family.service, family.toml());
     driver.settle();
     driver.now_us += 1'100'000;
     driver.settle();
@@ -188,12 +109,12 @@ TEST_CASE("silence, lost packets and a foreign clock are reported", "[lidar_driv
 TEST_CASE("stamps are those of the reception where they are asked for", "[lidar_driver]") {
   std::mt19937_64 random(4);
   DriverFixture fixture;
-  for (const Family& family : fixture.families(one_of_each_family())) {
+  for (const Family& family : three_makers(fixture, one_of_each_family())) {
     CAPTURE(family.sensor.name);
     // Three minutes behind: a clock of the time of day, but for its error.
     const auto recording = family.sensor.record(2, wall_us() - 180'000'000, random);
-    LiveDriver by_sensor(family.service, family.toml);
-    LiveDriver by_arrival(family.service, family.toml + "[time]\nsource = \"received\"\n");
+    LiveDriver by_sensor(family.service, family.toml());
+    LiveDriver by_arrival(family.service, family.toml() + "[time]\nsource = \"received\"\n");
     for (LiveDriver* driver : {&by_sensor, &by_arrival}) {
       for (const SentPacket& packet : recording.packets) send(*driver, family, packet);
       driver->finish();
@@ -212,10 +133,10 @@ TEST_CASE("stamps are those of the reception where they are asked for", "[lidar_
 TEST_CASE("another unit's samples may take the place of the laser's own", "[lidar_driver]") {
   std::mt19937_64 random(5);
   DriverFixture fixture;
-  for (const Family& family : fixture.families(one_of_each_family())) {
+  for (const Family& family : three_makers(fixture, one_of_each_family())) {
     if (family.ports.size() < 2) continue;
     CAPTURE(family.sensor.name);
-    LiveDriver driver(family.service, family.toml + "[imu]\nis_published = false\n");
+    LiveDriver driver(family.service, family.toml() + "[imu]\nis_published = false\n");
     for (const SentPacket& packet : family.sensor.record(1, wall_us(), random).packets)
       send(driver, family, packet);
     driver.finish();

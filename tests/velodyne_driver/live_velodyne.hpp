@@ -1,6 +1,7 @@
 // The Velodyne driver with sockets on loopback, and its decoder without.
 #pragma once
 
+#include "common/io/velodyne.hpp"
 #include "services/velodyne_driver/adapter.hpp"
 #include "tests/lidar_driver/live_driver.hpp"
 
