@@ -44,10 +44,11 @@ struct CloudEntry {
   std::filesystem::path path;
 };
 /// The .pcd, .ply or .bin files of a folder in order of time. Times: from timestamps.txt or
-/// times.txt in it or in the folder above (a number of seconds for each file, in the order of their
-/// names), else from their names: numbers of seconds, milliseconds, microseconds or nanoseconds
-/// since 1970, or seconds of a short clock; names that count 0, 1, 2 or 1, 2, 3 are times of
-/// `rate_hz`, and refused where it is 0. Throws io::DataError.
+/// times.txt in it or in the folder above (a number of seconds, or a date of ISO 8601, for each
+/// file, in the order of their names; where these are more, names are numbers of lines from 0),
+/// else from their names: numbers of seconds, milliseconds, microseconds or nanoseconds since 1970,
+/// or seconds of a short clock; names that count 0, 1, 2 or 1, 2, 3 are times of `rate_hz`, and
+/// refused where it is 0. Throws io::DataError.
 std::vector<CloudEntry> find_cloud_sequence(const std::filesystem::path& folder,
                                             double rate_hz = 0.0);
 

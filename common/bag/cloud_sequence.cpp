@@ -9,6 +9,7 @@
 
 #include "common/bag/cloud_file.hpp"
 #include "common/io/data_error.hpp"
+#include "common/io/date_time.hpp"
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
 
@@ -100,30 +101,55 @@ std::vector<CloudEntry> cloud_files(const std::filesystem::path& folder) {
   return files;
 }
 
-/// KITTI has times.txt in the folder above that of the clouds.
+/// KITTI has the times in the folder above that of the clouds: times.txt, raw drives
+/// timestamps.txt.
 std::optional<std::filesystem::path> stamps_beside(const std::filesystem::path& folder) {
   std::error_code failed;
   const std::filesystem::path above = std::filesystem::absolute(folder / "..").lexically_normal();
-  for (const std::filesystem::path& file :
-       {folder / "timestamps.txt", folder / "times.txt", above / "times.txt"}) {
+  for (const std::filesystem::path& file : {folder / "timestamps.txt", folder / "times.txt",
+                                            above / "times.txt", above / "timestamps.txt"}) {
     if (std::filesystem::exists(file, failed)) return file;
   }
   return std::nullopt;
+}
+
+std::vector<double> seconds_in(const std::filesystem::path& stamps) {
+  const std::string text =
+      io::RecordingFolder(stamps.parent_path()).read(stamps.filename().string());
+  std::vector<double> seconds;
+  if (io::begins_with_date(text)) {
+    for (const model::Utime utime : io::parse_date_times(text, stamps.string()))
+      seconds.push_back(1e-6 * static_cast<double>(utime));
+    return seconds;
+  }
+  io::NumberReader reader(text, stamps.string());
+  while (const auto value = reader.next()) seconds.push_back(*value);
+  return seconds;
+}
+
+/// The stamp of each file. A drive of KITTI may be cut, or lack files, and its stamps be whole:
+/// names are then numbers of lines, from 0.
+std::vector<double> seconds_of_files(const std::vector<CloudEntry>& files,
+                                     const std::vector<double>& stamps) {
+  if (files.size() == stamps.size()) return stamps;
+  std::vector<double> seconds;
+  for (const CloudEntry& file : files) {
+    const std::optional<double> number = number_of(file);
+    const bool is_line = number && *number >= 0.0 && *number == std::floor(*number) &&
+                         *number < static_cast<double>(stamps.size());
+    if (!is_line) return stamps;
+    seconds.push_back(stamps[static_cast<std::size_t>(*number)]);
+  }
+  return seconds;
 }
 
 }  // namespace
 
 std::vector<CloudEntry> find_cloud_sequence(const std::filesystem::path& folder, double rate_hz) {
   std::vector<CloudEntry> files = cloud_files(folder);
-  std::vector<double> seconds;
-  if (const auto stamps = stamps_beside(folder)) {
-    const std::string text =
-        io::RecordingFolder(stamps->parent_path()).read(stamps->filename().string());
-    io::NumberReader reader(text, stamps->string());
-    while (const auto value = reader.next()) seconds.push_back(*value);
-  } else {
-    seconds = seconds_of_names(files, folder, rate_hz);
-  }
+  const auto stamps = stamps_beside(folder);
+  const std::vector<double> seconds = stamps ? seconds_of_files(files, seconds_in(*stamps))
+                                             : seconds_of_names(files, folder, rate_hz);
 
   if (seconds.size() != files.size())
     throw io::DataError(fmt::format("{}: {} files for {} time stamps", folder.string(),

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <numbers>
 
 #include "common/io/data_error.hpp"
+#include "common/io/date_time.hpp"
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
 
@@ -20,48 +20,7 @@ namespace {
 
 constexpr std::size_t kPointBytes = 16;
 
-int digits(std::string_view line, std::size_t at, std::size_t count, const std::string& where) {
-  int value = 0;
-  const char* begin = line.data() + at;
-  const bool fits = at + count <= line.size();
-  const auto result =
-      fits ? std::from_chars(begin, begin + count, value) : std::from_chars_result{begin, {}};
-  if (!fits || result.ptr != begin + count)
-    throw DataError(fmt::format("{}: '{}' is no time stamp", where, line.substr(0, 40)));
-  return value;
-}
-
 }  // namespace
-
-std::vector<model::Utime> parse_timestamps(std::string_view text, std::string_view source) {
-  std::vector<model::Utime> stamps;
-  std::size_t number = 0;
-  while (!text.empty()) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(text.size(), line.size() + 1));
-    ++number;
-    if (line.find_first_not_of(" \r\t") == std::string_view::npos) continue;
-
-    const std::string where = fmt::format("{}, line {}", source, number);
-    const std::chrono::year_month_day day{
-        std::chrono::year(digits(line, 0, 4, where)),
-        std::chrono::month(static_cast<unsigned>(digits(line, 5, 2, where))),
-        std::chrono::day(static_cast<unsigned>(digits(line, 8, 2, where)))};
-    const int hour = digits(line, 11, 2, where);
-    const int minute = digits(line, 14, 2, where);
-    const int second = digits(line, 17, 2, where);
-    const int micros = digits(line, 20, 6, where);
-    if (!day.ok() || hour > 23 || minute > 59 || second > 60)
-      throw DataError(fmt::format("{}: '{}' is no time stamp", where, line.substr(0, 40)));
-
-    const auto days = std::chrono::sys_days(day).time_since_epoch().count();
-    const model::Utime seconds =
-        static_cast<model::Utime>(days) * 86400 + hour * 3600 + minute * 60 + second;
-    stamps.push_back(seconds * 1'000'000 + micros);
-  }
-
-  return stamps;
-}
 
 model::PointSweep parse_points(std::string_view bytes, double revolution_s,
                                std::string_view source) {
@@ -149,7 +108,7 @@ std::vector<fs::path> files_of(const fs::path& folder, std::string_view extensio
 }
 
 std::vector<model::Utime> stamps_of(const RecordingFolder& folder, std::string_view name) {
-  return kitti::parse_timestamps(folder.read(name), folder.describe(name));
+  return parse_date_times(folder.read(name), folder.describe(name));
 }
 
 /// The stamp of each file: its name is the line's number. Drives may be cut, their stamps whole.

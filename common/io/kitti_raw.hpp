@@ -51,8 +51,6 @@ constexpr std::uint16_t kRings = 64;
 /// calib_imu_to_velo.txt in the plane.
 inline geometry::SE2 vehicle_T_laser() { return {0.8105, -0.3072, 0.00076}; }
 
-/// "2011-09-26 13:02:44.335092332" per line (UTC). Throws DataError.
-std::vector<model::Utime> parse_timestamps(std::string_view text, std::string_view source);
 /// Bytes of a .bin file to points with rings and times within `revolution_s`. Throws DataError.
 model::PointSweep parse_points(std::string_view bytes, double revolution_s,
                                std::string_view source);

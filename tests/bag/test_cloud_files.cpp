@@ -405,6 +405,25 @@ TEST_CASE("a sequence of PCD files has its times from names, a table or a rate",
   for (const char* name : {"000000.bin", "000001.bin"}) write(std::string("00/velodyne/") + name);
   write("00/times.txt", "0.0\n0.1036\n");
   CHECK(utimes("00/velodyne") == Utimes{0, 103'600});
+  // Raw drives have dates.
+  for (const char* name : {"0000000000.bin", "0000000001.bin"})
+    write(std::string("drive/velodyne_points/data/") + name);
+  write("drive/velodyne_points/timestamps.txt",
+        "2011-09-26 13:02:25.594360375\n2011-09-26 13:02:25.698000000\n");
+  CHECK(utimes("drive/velodyne_points/data") ==
+        Utimes{1'317'042'145'594'360, 1'317'042'145'698'000});
+  write("drive/velodyne_points/data/0000000003.bin");
+  write("drive/velodyne_points/timestamps.txt",
+        "2011-09-26 13:02:25\n2011-09-26 13:02:26\n2011-09-26 13:02:27\n2011-09-26 13:02:28\n");
+  CHECK(utimes("drive/velodyne_points/data") ==
+        Utimes{1'317'042'145'000'000, 1'317'042'146'000'000, 1'317'042'148'000'000});
+  write("drive/velodyne_points/data/0000000004.bin");
+  write("drive/velodyne_points/data/0000000005.bin");
+  CHECK_THROWS_WITH(utimes("drive/velodyne_points/data"), Contains("5 files for 4 time stamps"));
+  write("dates/a.pcd");
+  write("dates/timestamps.txt", "2011-09-26 13h02\n");
+  CHECK_THROWS_WITH(utimes("dates"),
+                    Contains("dates/timestamps.txt, line 1: '2011-09-26 13h02' is no time stamp"));
   write("00/velodyne/000002.ply");
   CHECK_THROWS_WITH(utimes("00/velodyne"), Contains(".bin and .ply files: one kind is wanted"));
 }

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "common/io/data_error.hpp"
+#include "common/io/date_time.hpp"
 #include "common/io/kitti_raw.hpp"
 #include "common/io/packet_capture.hpp"
 #include "common/io/sensor_tables.hpp"
@@ -100,12 +101,26 @@ TEST_CASE("the reduced KITTI drive is read with its poses", "[kitti][recorded]")
   CHECK_THROWS_AS(ReducedKitti(folder, "gps"), DataError);
 }
 
+TEST_CASE("dates are read as ISO 8601 writes them", "[date]") {
+  constexpr model::Utime kTime = 1'317'042'164'335'092;
+  const auto parsed = [](std::string_view text) { return parse_date_times(text, "t"); };
+  CHECK(parsed("2011-09-26 13:02:44.335092332\n") == std::vector{kTime});
+  CHECK(parsed("\n2011-09-26T13:02:44.335092Z\r\n \n2011-09-26T15:02:44,335092+02:00\n"
+               "2011-09-26 08:32:44.3350929-0430") == std::vector{kTime, kTime, kTime});
+  CHECK(parsed("2011-09-26 13:02:44.5\n2011-09-26T15:02:45+02") ==
+        std::vector<model::Utime>{1'317'042'164'500'000, 1'317'042'165'000'000});
+  for (const char* bad :
+       {"2011-13-26 13:02:44.335092332", "x", "2011-09-26", "2011-09-26 25:02:44.335092332",
+        "2011-09-26 13:02:44.", "2011-09-26 13:02:44 CET", "2011-09-26 13:02:44+99:00",
+        "2011-09-26_13:02:44", "2011-09-26 13:-2:44"})
+    CHECK_THROWS_AS(parsed(bad), DataError);
+  CHECK_THROWS_WITH(parsed("2011-09-26 13:02:44\n12.5\n"), "t, line 2: '12.5' is no time stamp");
+  CHECK(begins_with_date(" \n2011-09-26 13"));
+  for (const char* number : {"", "12.5", "-1", "1317042164.335", "2011"})
+    CHECK_FALSE(begins_with_date(number));
+}
+
 TEST_CASE("KITTI's texts are checked", "[kitti]") {
-  CHECK(kitti::parse_timestamps("2011-09-26 13:02:44.335092332\n", "t") ==
-        std::vector<model::Utime>{1'317'042'164'335'092});
-  for (const char* bad : {"2011-13-26 13:02:44.335092332", "x", "2011-09-26 13:02:44",
-                          "2011-09-26 25:02:44.335092332"})
-    CHECK_THROWS_AS(kitti::parse_timestamps(bad, "t"), DataError);
   CHECK_THROWS_AS(kitti::parse_points("123", 0.1, "p"), DataError);
   CHECK_THROWS_AS(parse_oxts("49.0 8.4 116", "o"), DataError);
   CHECK_THROWS_AS(kitti::parse_transform("a\nR: 1 0 0 0 1 0 0 0 2\nT: 0 0 0\n", "c"), DataError);
