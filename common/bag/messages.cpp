@@ -67,6 +67,10 @@ Header read_header(MessageReader& reader) {
   return header;
 }
 
+bool has_stamp(const Header& header, std::int64_t received_ns) {
+  return header.stamp_ns != 0 || std::abs(received_ns) < kSecond_ns;
+}
+
 PointCloud read_point_cloud(MessageReader& reader) {
   PointCloud cloud;
   cloud.header = read_header(reader);

@@ -108,6 +108,9 @@ struct PacketScan {
 
 /// The header with which most messages begin.
 Header read_header(MessageReader& reader);
+/// False where the sender left the stamp at 0. A clock of a simulation may begin there, and then
+/// the recorder's does, too.
+bool has_stamp(const Header& header, std::int64_t received_ns);
 /// sensor_msgs/PointCloud2. Fields and data are not yet compared: see CloudDecoder.
 PointCloud read_point_cloud(MessageReader& reader);
 /// CustomMsg of both Livox drivers.

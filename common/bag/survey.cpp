@@ -75,8 +75,9 @@ void look_into(const Bag& bag, const Message& message, Survey& survey, TopicSurv
   const Header header = has_packets ? read_packets(reader, topic.type).header : read_header(reader);
   if (found.messages == 1)
     found.frame = is_ouster_packet_type(topic.type) ? kOusterFrame : header.frame;
-  if (header.stamp_ns != 0 || !has_packets)
-    gathered.differences.add(header.stamp_ns - message.received_ns);
+  const bool is_stamped = has_stamp(header, message.received_ns);
+  if (is_stamped) gathered.differences.add(header.stamp_ns - message.received_ns);
+  if (!is_stamped && !has_packets) ++found.without_stamp;
   if (has_packets) return;
   if (role == Role::kImu && found.messages <= kForcesLookedAt) {
     MessageReader again = reader_of(bag, message);

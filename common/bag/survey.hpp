@@ -33,7 +33,8 @@ struct TopicSurvey {
   std::int64_t first_ns = 0;  ///< Received.
   std::int64_t last_ns = 0;
   std::string frame;                    ///< Of the first header.
-  double stamp_minus_received_s = 0.0;  ///< Median.
+  double stamp_minus_received_s = 0.0;  ///< Median, of those that have a stamp.
+  std::uint64_t without_stamp = 0;      ///< Messages; packets may have none.
   std::string cloud;                    ///< CloudDecoder::description(), of clouds.
   /// Mean of an IMU's first 100 messages, in the unit that it has.
   Eigen::Vector3d force_mps2 = Eigen::Vector3d::Zero();

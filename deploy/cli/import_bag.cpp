@@ -217,8 +217,10 @@ void add_frames(CLI::App& command, BagImportOptions& options) {
 void add_readings(CLI::App& command, BagImportOptions& options) {
   BagConversion& conversion = options.conversion;
   command
-      .add_option("--receive-time", options.receive_time,
-                  "Topic whose clock is wrong: its stamps are laid onto the recorder's clock")
+      .add_option(
+          "--receive-time", options.receive_time,
+          "Topic whose clock is wrong: its stamps are laid onto the recorder's clock; stamps "
+          "of 0 become the times of reception")
       ->allow_extra_args(false);
   add_cloud_options(command, conversion.cloud);
   command.add_option("--model", conversion.laser.model,

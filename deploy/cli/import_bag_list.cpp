@@ -44,7 +44,9 @@ Row row_of(const bag::Topic& topic, const bag::TopicSurvey& found, const std::st
   row[3] = found.rate_hz() > 0.0 ? number(found.rate_hz(), "{:.2f}") : "";
   row[4] = terminal::printable(found.frame);
   if (role_of(topic) != bag::Role::kTransforms)
-    row[5] = number(found.stamp_minus_received_s, "{:+.3f}");
+    row[5] = found.without_stamp == found.messages
+                 ? "no stamp"
+                 : number(found.stamp_minus_received_s, "{:+.3f}");
   return row;
 }
 
@@ -117,19 +119,28 @@ void print_mounts(const bag::Bag& bag, const bag::Survey& survey, const BagMount
 
 std::vector<std::string> clock_remarks(const bag::Bag& bag, const bag::Survey& survey,
                                        const std::vector<std::size_t>& chosen) {
+  std::vector<std::string> lines;
+  std::vector<std::size_t> stamped;
   std::vector<double> offsets;
-  offsets.reserve(chosen.size());
-  for (const std::size_t topic : chosen)
-    offsets.push_back(survey.topics[topic].stamp_minus_received_s);
-  if (offsets.empty()) return {};
+  for (const std::size_t topic : chosen) {
+    const bag::TopicSurvey& found = survey.topics[topic];
+    if (found.without_stamp > 0)
+      lines.push_back(fmt::format(
+          "{0}: the stamp of {1} of {2} messages is 0: --receive-time {0} takes the time of "
+          "reception",
+          bag.topics()[topic].name, found.without_stamp, found.messages));
+    if (found.without_stamp == found.messages) continue;
+    stamped.push_back(topic);
+    offsets.push_back(found.stamp_minus_received_s);
+  }
+  if (offsets.empty()) return lines;
   // The clock nearest to the recorder's is the one to which the others are compared.
   const double reference =
       *std::ranges::min_element(offsets, {}, [](double offset) { return std::abs(offset); });
 
-  std::vector<std::string> lines;
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
+  for (std::size_t i = 0; i < stamped.size(); ++i) {
     if (std::abs(offsets[i] - reference) < kClockApart_s) continue;
-    const std::string& name = bag.topics()[chosen[i]].name;
+    const std::string& name = bag.topics()[stamped[i]].name;
     lines.push_back(fmt::format(
         "{}: its stamps are {:+.3f} s from the time of reception, those of others {:+.3f} s: "
         "--receive-time {} lays them onto the recorder's clock",

@@ -24,6 +24,11 @@ void turn_to_driver(model::PointSweep& sweep) {
   for (model::SweepPoint& point : sweep.points) point.x_m = -std::exchange(point.y_m, point.x_m);
 }
 
+model::Utime utime_of_stamp(std::int64_t stamp_ns) {
+  if (stamp_ns < 0) throw io::DataError("a stamp before 1970");
+  return stamp_ns / 1000;
+}
+
 double yaw_of(const Eigen::Isometry3d& pose) {
   return std::atan2(pose.linear()(1, 0), pose.linear()(0, 0));
 }
@@ -69,10 +74,17 @@ std::int64_t BagMessages::shift_ns(std::size_t topic) const {
   return std::llround(std::clamp(shift, -kMost_ns, kMost_ns));
 }
 
-model::Utime BagMessages::utime_of(const bag::Header& header, std::size_t topic) const {
-  const std::int64_t stamp = header.stamp_ns + shift_ns(topic);
-  if (stamp < 0) throw io::DataError("a stamp before 1970");
-  return stamp / 1000;
+/// On the clock of the log.
+std::int64_t BagMessages::stamp_ns(const bag::Header& header, const bag::Message& message) const {
+  if (has_stamp(header, message.received_ns)) return header.stamp_ns + shift_ns(message.topic);
+  if (!conversion_.by_reception.contains(message.topic))
+    throw io::DataError(fmt::format("its stamp is 0: --receive-time {} takes the time of reception",
+                                    bag_.topics()[message.topic].name));
+  return message.received_ns;
+}
+
+model::Utime BagMessages::utime_of(const bag::Header& header, const bag::Message& message) const {
+  return utime_of_stamp(stamp_ns(header, message));
 }
 
 void BagMessages::add_sweep(const model::PointSweep& sweep) {
@@ -90,12 +102,16 @@ void BagMessages::take_cloud(const bag::Message& message) {
   const std::string& type = bag_.topics()[message.topic].type;
   if (bag::is_packet_type(type)) return take_packets(message);
   bag::MessageReader reader = reader_of(bag_, message);
-  model::PointSweep sweep = type == "sensor_msgs/PointCloud2"
-                                ? decoder_.decode(read_point_cloud(reader))
-                                : decoder_.decode(read_livox_cloud(reader));
-  // The decoder compares times of points with the stamp as it is.
-  sweep.utime += shift_ns(message.topic) / 1000;
-  add_sweep(sweep);
+  const auto decoded = [&](auto cloud) {
+    const std::int64_t on_log_ns = stamp_ns(cloud.header, message);
+    if (!has_stamp(cloud.header, message.received_ns)) cloud.header.stamp_ns = on_log_ns;
+    // The decoder compares times of points with the stamp as it is.
+    model::PointSweep sweep = decoder_.decode(cloud);
+    sweep.utime += (on_log_ns - cloud.header.stamp_ns) / 1000;
+    return sweep;
+  };
+  add_sweep(type == "sensor_msgs/PointCloud2" ? decoded(read_point_cloud(reader))
+                                              : decoded(read_livox_cloud(reader)));
 }
 
 void BagMessages::make_laser(const bag::PacketScan::Packet& packet, const std::string& type) {
@@ -138,7 +154,7 @@ void BagMessages::take_readings(const packets::Readings& readings) {
 void BagMessages::take_scan(const bag::Message& message) {
   bag::MessageReader reader = reader_of(bag_, message);
   bag::LaserScan scan = read_laser_scan(reader);
-  scan.scan.utime = utime_of(scan.header, message.topic);
+  scan.scan.utime = utime_of(scan.header, message);
   const model::Utime end = scan.scan.end();
   log_.add("RAW_SCAN", std::move(scan.scan), end);
 }
@@ -148,7 +164,7 @@ void BagMessages::take_imu(const bag::Message& message) {
   bag::MessageReader reader = reader_of(bag_, message);
   const bag::Imu imu = read_imu(reader);
   model::ImuSample sample;
-  sample.utime = utime_of(imu.header, message.topic);
+  sample.utime = utime_of(imu.header, message);
   sample.angular_rate_rad_s = imu.angular_rate_rad_s;
   sample.specific_force_mps2 = imu.specific_force_mps2;
   log_.add("RAW_IMU", sample, sample.utime);
@@ -173,8 +189,9 @@ void BagMessages::take_odometry(const bag::Message& message) {
   const std::string& type = bag_.topics()[message.topic].type;
   if (conversion_.has_speed_from_pose && bag::is_twist_type(type))
     throw io::DataError("--speed-from-pose: " + type + " has no pose");
-  const bag::Odometry odometry = read_odometry(reader, type);
-  const bag::Pose& pose = odometry.pose;
+  bag::Odometry odometry = read_odometry(reader, type);
+  bag::Pose& pose = odometry.pose;
+  pose.header.stamp_ns = stamp_ns(pose.header, message);
   if (!odometry.velocity_mps.allFinite() || !odometry.angular_rate_rad_s.allFinite())
     throw io::DataError("a velocity that is no number");
   const auto [velocity_mps, vehicle_rate_rad_s] =
@@ -193,7 +210,7 @@ void BagMessages::take_odometry(const bag::Message& message) {
     motion = {moved.translation().x() / seconds, moved.translation().y() / seconds,
               yaw_of(moved) / seconds};
   }
-  add_wheels(motion, utime_of(pose.header, message.topic));
+  add_wheels(motion, utime_of_stamp(pose.header.stamp_ns));
 }
 
 /// Speed and steering of a car: what no car can do is counted.
@@ -219,7 +236,7 @@ void BagMessages::take_fix(const bag::Message& message) {
   }
   if (!plane_) plane_.emplace(fix.latitude_deg, fix.longitude_deg);
   model::GnssFix out;
-  out.utime = utime_of(fix.header, message.topic);
+  out.utime = utime_of(fix.header, message);
   out.east_north_m = plane_->east_north_m(fix.latitude_deg, fix.longitude_deg);
   out.sigma_m = fix.sigma_m;
   gnss_t message_out = wire::to_wire(out);
@@ -244,7 +261,7 @@ void BagMessages::take_truth(const bag::Message& message) {
   }
 
   ground_truth_t truth{};
-  truth.utime = utime_of(pose.header, message.topic);
+  truth.utime = utime_of(pose.header, message);
   truth.world_T_vehicle = wire::to_wire(
       geometry::SE2(world_T_vehicle.translation().head<2>(), yaw_of(world_T_vehicle)));
   log_.add("GROUND_TRUTH", truth, truth.utime);

@@ -23,7 +23,8 @@ struct BagConversion {
   double wheelbase_m = 2.7;            ///< For the steering of RAW_WHEELS.
   bool has_speed_from_pose = false;    ///< RAW_WHEELS from the poses of odometry, not its twist.
   std::string truth_frame;             ///< Whose pose the truth is; empty = as the message says.
-  std::set<std::size_t> by_reception;  ///< Topics whose stamps are laid onto the recorder's clock.
+  std::set<std::size_t> by_reception;  ///< Topics whose stamps are laid onto the recorder's clock;
+                                       ///< a stamp of 0 is none.
 };
 
 /// Takes the messages of the chosen topics, one after another.
@@ -69,7 +70,8 @@ class BagMessages {
   void take_fix(const bag::Message& message);
   void take_truth(const bag::Message& message);
   std::int64_t shift_ns(std::size_t topic) const;
-  model::Utime utime_of(const bag::Header& header, std::size_t topic) const;
+  std::int64_t stamp_ns(const bag::Header& header, const bag::Message& message) const;
+  model::Utime utime_of(const bag::Header& header, const bag::Message& message) const;
 
   const bag::Bag& bag_;
   const bag::Survey& survey_;
