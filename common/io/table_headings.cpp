@@ -62,10 +62,22 @@ struct Unit {
   std::string_view name;
   double metres;
 };
-constexpr std::array kUnits{Unit{"m", 1.0}, Unit{"cm", 0.01}, Unit{"mm", 0.001}};
-
-constexpr std::array<std::string_view, 3> kFeet{"ft", "usft", "ftus"};
+constexpr double kUsFoot_m = 1200.0 / 3937.0;
+constexpr double kFoot_m = 0.3048;
+constexpr std::array kUnits{Unit{"m", 1.0},          Unit{"cm", 0.01},       Unit{"mm", 0.001},
+                            Unit{"in", 0.0254},      Unit{"inch", 0.0254},   Unit{"inches", 0.0254},
+                            Unit{"ft", kFoot_m},     Unit{"foot", kFoot_m},  Unit{"feet", kFoot_m},
+                            Unit{"usft", kUsFoot_m}, Unit{"ftus", kUsFoot_m}};
+constexpr const char* kUnitNames = "m, cm, mm, in, ft";
 constexpr std::array<std::string_view, 2> kDegreeUnits{"deg", "degrees"};
+
+/// None of a word that is no unit of length.
+std::optional<double> length_m(std::string_view word) {
+  const auto* const found = std::ranges::find(kUnits, word, &Unit::name);
+  return found == kUnits.end() ? std::nullopt : std::optional(found->metres);
+}
+
+bool is_foot(double unit_m) { return std::abs(unit_m - kFoot_m) < 1e-5; }
 
 /// A heading without what differs from table to table, and its unit.
 struct PlainHeading {
@@ -88,12 +100,13 @@ PlainHeading plain(std::string_view heading) {
   if (words.back().empty() && words.size() > 1) words.pop_back();
 
   PlainHeading result;
-  const bool is_unit = std::ranges::find(kUnits, words.back(), &Unit::name) != kUnits.end() ||
-                       std::ranges::find(kFeet, words.back()) != kFeet.end() ||
-                       std::ranges::find(kDegreeUnits, words.back()) != kDegreeUnits.end();
+  const bool is_unit =
+      length_m(words.back()) || std::ranges::find(kDegreeUnits, words.back()) != kDegreeUnits.end();
   if (words.size() > 1 && (is_unit || has_brackets)) {
     result.unit = words.back();
     words.pop_back();
+    // "BHD in cm"
+    if (words.size() > 1 && words.back() == "in") words.pop_back();
   }
   for (const std::string& word : words) result.name += word;
   return result;
@@ -110,17 +123,15 @@ bool is_of(const KnownHeading& known, const CoordinateUnit& unit) {
 
 bool is_coordinate(LandmarkColumn column) { return column == kX || column == kY; }
 
-/// Feet are those of the reference system: there are several.
+/// Feet are those of the reference system: there are several, and at 2,000 km they differ by 4 m.
 std::optional<double> coordinate_unit(std::string_view written, const CoordinateUnit& unit) {
-  constexpr double kFoot_m = 0.3048;
   if (written.empty()) return unit.is_degrees ? 1.0 : unit.metres;
   if (unit.is_degrees)
     return std::ranges::find(kDegreeUnits, written) != kDegreeUnits.end() ? std::optional(1.0)
                                                                           : std::nullopt;
-  const bool is_in_feet = std::abs(unit.metres - kFoot_m) < 1e-5;
-  if (is_in_feet && std::ranges::find(kFeet, written) != kFeet.end()) return unit.metres;
-  const auto* const found = std::ranges::find(kUnits, written, &Unit::name);
-  return found == kUnits.end() ? std::nullopt : std::optional(found->metres);
+  const std::optional<double> length = length_m(written);
+  if (!length || !is_foot(*length) || !unit.is_of_system) return length;
+  return is_foot(unit.metres) ? std::optional(unit.metres) : std::nullopt;
 }
 
 [[noreturn]] void refuse_unit(std::string_view written, std::string_view unit,
@@ -136,17 +147,19 @@ double unit_m(const PlainHeading& heading, std::string_view written, LandmarkCol
     const auto found = coordinate_unit(heading.unit, unit);
     if (!found)
       refuse_unit(written, heading.unit,
-                  unit.is_degrees ? "deg (the reference system has degrees)" : "m, cm, mm");
+                  unit.is_degrees     ? "deg (the reference system has degrees)"
+                  : unit.is_of_system ? "m, cm, mm (feet are for reference systems in feet)"
+                                      : kUnitNames);
     return *found;
   }
 
   if (heading.unit.empty())
     throw std::invalid_argument(
-        fmt::format("column '{}' has no unit: is it in m, cm or mm? (--columns {}_cm={})", written,
-                    column == kDiameter ? heading.name : "sigma", written));
-  const auto* const found = std::ranges::find(kUnits, heading.unit, &Unit::name);
-  if (found == kUnits.end()) refuse_unit(written, heading.unit, "m, cm, mm");
-  return found->metres;
+        fmt::format("column '{}' has no unit: is it in m, cm, mm, in or ft? (--columns {}_cm={})",
+                    written, column == kDiameter ? heading.name : "sigma", written));
+  const std::optional<double> length = length_m(heading.unit);
+  if (!length) refuse_unit(written, heading.unit, kUnitNames);
+  return *length;
 }
 
 /// Letters that must be changed, added or left out to make one of the other (Levenshtein).
@@ -243,6 +256,22 @@ void refuse_missing(LandmarkColumn column, const std::vector<std::string>& passe
   throw std::invalid_argument(missing_text(column, passed_over, unit));
 }
 
+/// "dbh_furlong" where no other column is the diameter: its unit is not known.
+void refuse_unknown_units(const TableHeadings& found, const CoordinateUnit& unit) {
+  for (const std::string& heading : found.passed_over) {
+    const std::size_t cut = heading.find_last_of(" _-");
+    if (cut == std::string::npos) continue;
+    const KnownHeading* const known = known_heading(plain(heading.substr(0, cut)).name);
+    if (known == nullptr || !is_of(*known, unit) || known->column == LandmarkColumn::kKind ||
+        found.at(known->column))
+      continue;
+    const std::string word = heading.substr(cut + 1);
+    const bool is_word =
+        std::ranges::all_of(word, [](unsigned char letter) { return std::isalpha(letter) != 0; });
+    if (is_word && !word.empty()) refuse_unit(heading, word, kUnitNames);
+  }
+}
+
 }  // namespace
 
 std::vector<NamedColumn> parse_named_columns(std::string_view text) {
@@ -257,7 +286,8 @@ std::vector<NamedColumn> parse_named_columns(std::string_view text) {
     const std::string role(one.substr(0, sign));
     if (known_heading(plain(role).name) == nullptr)
       throw std::invalid_argument(fmt::format(
-          "'{}' is none of x, y, lat, lon, sigma_m, dbh_m (or _cm, _mm), radius_m, kind", role));
+          "'{}' is none of x, y, lat, lon, sigma_m, dbh_m (or _cm, _mm, _in, _ft), radius_m, kind",
+          role));
     named.push_back({role, std::string(one.substr(sign + 1))});
   }
   return named;
@@ -283,6 +313,7 @@ TableHeadings recognise_headings(std::span<const std::string> headings,
          {i, known->factor * unit_m(heading, headings[i], known->column, unit)}, headings[i]);
   }
 
+  refuse_unknown_units(result, unit);
   for (const LandmarkColumn column : {kX, kY})
     if (!result.at(column)) refuse_missing(column, result.passed_over, unit);
   return result;

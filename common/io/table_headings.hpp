@@ -24,8 +24,9 @@ struct NamedColumn {
 
 /// What coordinates are in, where their headings have no unit.
 struct CoordinateUnit {
-  bool is_degrees = false;  ///< Of longitude and latitude.
-  double metres = 1.0;      ///< Of a projected system, e.g. 0.3048006 (US survey feet).
+  bool is_degrees = false;    ///< Of longitude and latitude.
+  double metres = 1.0;        ///< Of a projected system, e.g. 0.3048006 (US survey feet).
+  bool is_of_system = false;  ///< A reference system says so, and which foot is meant.
 };
 
 /// Where a column stands, and what its numbers are multiplied by to be metres.
@@ -51,7 +52,7 @@ std::vector<NamedColumn> parse_named_columns(std::string_view text);
 
 /// Recognises headings, whatever their case, blanks and underscores: x, east, easting, rechtswert;
 /// y, north, northing, hochwert; dbh, bhd, diameter; radius; sigma; kind; where coordinates are
-/// degrees, longitude, lon; latitude, lat. A unit stands behind: x_m, "BHD [cm]", dbh_mm.
+/// degrees, longitude, lon; latitude, lat. A unit stands behind: x_m, "BHD [cm]", dbh_in, y_ft.
 /// Coordinates without one are in `unit`; a diameter, radius or sigma without one is refused, since
 /// its unit is unknown. `named` columns count instead of what is recognised. Throws
 /// std::invalid_argument (a text for the heading's line) where x or y is missing, with the heading

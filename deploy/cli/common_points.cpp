@@ -127,7 +127,7 @@ NamedPoints control_points_in(const std::string& file, const std::string& system
   if (table.heading.cells.empty()) throw io::DataError(file + ": no heading");
   const MapColumns columns = map_columns(table);
   const io::TableHeadings headings =
-      headings_of(table, {summary.is_geographic, summary.is_geographic ? 1.0 : summary.unit});
+      headings_of(table, {summary.is_geographic, summary.is_geographic ? 1.0 : summary.unit, true});
 
   NamedPoints known;
   for (const io::TextRow& row : table.rows) {

@@ -138,7 +138,8 @@ MapOfTable map_of_table(const MapTableOptions& options,
                         const std::optional<model::MapReference>& frame) {
   if (options.crs.empty()) return map_in_metres(options);
   const reference_system::SystemSummary system = reference_system::summary_of(options.crs);
-  const io::CoordinateUnit unit{system.is_geographic, system.is_geographic ? 1.0 : system.unit};
+  const io::CoordinateUnit unit{system.is_geographic, system.is_geographic ? 1.0 : system.unit,
+                                true};
   Rows rows = rows_of(options, unit).rows;
 
   // Rows in degrees and in metres become coordinates in the system's own units by one factor.

@@ -41,7 +41,7 @@ TEST_CASE("what is no table of landmarks is refused with its line", "[io]") {
            {"1,2\n3,4\n", "line 1", "no column for x"},
            {"x_m,northig\n1,2\n", "line 1", "nearest is 'northig' (--columns 'y=northig')"},
            {"x,y,dbh\n1,2,30\n", "line 1", "column 'dbh' has no unit"},
-           {"x,y,dbh [inch]\n1,2,3\n", "line 1", "the unit 'inch' is none of m, cm, mm"},
+           {"x,y,dbh [yd]\n1,2,3\n", "line 1", "the unit 'yd' is none of m, cm, mm, in, ft"},
            {"lon,lat\n8.1,50.2\n", "line 1", "column 'lon' is in degrees"},
            {"x,y\n1,5,2\n", "line 2", "3 cells"},
            {"x;y\n1.234,5;2\n", "line 2", "x_m '1.234,5' is no finite number"},

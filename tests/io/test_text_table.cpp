@@ -122,13 +122,13 @@ TEST_CASE("coordinates are in the units of their reference system", "[io]") {
         .landmark.position_m;
   };
   const double foot_m = 1200.0 / 3937.0;
-  CHECK(place("easting,northing\n6000000,2000000\n", {false, foot_m}) ==
+  CHECK(place("easting,northing\n6000000,2000000\n", {false, foot_m, true}) ==
         Eigen::Vector2d(6000000 * foot_m, 2000000 * foot_m));
-  CHECK(place("x_ft,y [ft]\n10,20\n", {false, foot_m}) ==
+  CHECK(place("x_ft,y [ft]\n10,20\n", {false, foot_m, true}) ==
         Eigen::Vector2d(10 * foot_m, 20 * foot_m));
-  CHECK(place("x_m,y_m\n10,20\n", {false, foot_m}) == Eigen::Vector2d(10, 20));
-  CHECK(place("lat,lon\n51.5,7.25\n", {true, 1.0}) == Eigen::Vector2d(7.25, 51.5));
-  CHECK(place("Longitude [deg];Latitude [deg]\n-70,5;-33,25\n", {true, 1.0}) ==
+  CHECK(place("x_m,y_m\n10,20\n", {false, foot_m, true}) == Eigen::Vector2d(10, 20));
+  CHECK(place("lat,lon\n51.5,7.25\n", {true, 1.0, true}) == Eigen::Vector2d(7.25, 51.5));
+  CHECK(place("Longitude [deg];Latitude [deg]\n-70,5;-33,25\n", {true, 1.0, true}) ==
         Eigen::Vector2d(-70.5, -33.25));
 
   const auto refused = [&](const std::string& text, const io::CoordinateUnit& unit,
@@ -136,14 +136,48 @@ TEST_CASE("coordinates are in the units of their reference system", "[io]") {
     CAPTURE(text);
     CHECK_THROWS_WITH(place(text, unit), Contains("t.csv, line") && Contains(why));
   };
-  refused("x_ft,y_ft\n1,2\n", {}, "the unit 'ft' is none of m, cm, mm");
+  // Without a system they are metres' feet; a system in metres does not say which ones.
+  CHECK(place("x_ft,y_feet\n10,20\n", {}) == Eigen::Vector2d(10 * 0.3048, 20 * 0.3048));
+  CHECK(place("x_usft,y_usft\n10,20\n", {}) == Eigen::Vector2d(10 * foot_m, 20 * foot_m));
+  refused("x_ft,y_ft\n1,2\n", {false, 1.0, true}, "the unit 'ft' is none of m, cm, mm (feet");
   refused("lat,lon\n1,2\n", {}, "is in degrees: --crs EPSG:4326");
-  refused("easting,northing\n1,2\n", {true, 1.0}, "the reference system has degrees");
-  refused("lat_m,lon_m\n1,2\n", {true, 1.0}, "'m' is none of deg");
-  refused("lat,lon\n7,51\n95,7\n", {true, 1.0}, "line 3: latitude 95 is not within");
+  refused("easting,northing\n1,2\n", {true, 1.0, true}, "the reference system has degrees");
+  refused("x_m,y_m\n1,2\n", {true, 1.0, true}, "the reference system has degrees");
+  refused("lat_m,lon_m\n1,2\n", {true, 1.0, true}, "'m' is none of deg");
+  refused("lat,lon\n7,51\n95,7\n", {true, 1.0, true}, "line 3: latitude 95 is not within");
   CHECK_THROWS_WITH(io::parse_landmark_table("a,b\n1,2\n", "t.csv",
                                              {0.1, io::parse_named_columns("lat=a,lon=b"), {}}),
                     Contains("the reference system has no degrees"));
+}
+
+TEST_CASE("lengths may be in inches and feet, and in no unit that is not known", "[io]") {
+  const auto radius_m = [](const std::string& heading, const std::string& value) {
+    return io::parse_landmark_table("x_m,y_m," + heading + "\n1,2," + value + "\n", "t.csv",
+                                    {0.1, {}, {}})
+        .rows.front()
+        .landmark.radius_m;
+  };
+  for (const char* inches : {"dbh_in", "DBH (in)", "dbh [inch]", "Diameter inches", "dbh in"})
+    CHECK(radius_m(inches, "20") == Approx(0.254));
+  CHECK(radius_m("radius_ft", "1") == Approx(0.3048));
+  CHECK(radius_m("BHD in cm", "50") == Approx(0.25));
+  const auto sigma = io::parse_landmark_table("x_m,y_m,sigma_ft\n1,2,1\n", "t.csv", {0.1, {}, {}});
+  CHECK(sigma.rows.front().landmark.covariance_m2(0, 0) == Approx(0.3048 * 0.3048));
+  const auto named = io::parse_named_columns("dbh_in=D");
+  CHECK(io::parse_landmark_table("x,y,D\n1,2,10\n", "t.csv", {0.1, named, {}})
+            .rows.front()
+            .landmark.radius_m == Approx(0.127));
+
+  for (const char* heading : {"dbh_furlong", "dbh [furlong]"})
+    CHECK_THROWS_WITH(radius_m(heading, "1"), Contains("t.csv, line 1") && Contains(heading) &&
+                                                  Contains("the unit 'furlong' is none of m, cm, "
+                                                           "mm, in, ft"));
+  CHECK_THROWS_WITH(io::parse_landmark_table("x_yd,y_yd\n1,2\n", "t.csv", {0.1, {}, {}}),
+                    Contains("'x_yd': the unit 'yd' is none of m, cm, mm, in, ft"));
+  // A column beside that of the diameter may be called so, and one that is no length.
+  CHECK(radius_m("dbh_cm,dbh_class", "20,3") == Approx(0.1));
+  CHECK(radius_m("kind_code", "3") == 0.0);
+  CHECK(radius_m("dbh_2019", "3") == 0.0);
 }
 
 TEST_CASE("radii are read, and odd diameters are told with their row and column", "[io]") {
