@@ -12,6 +12,7 @@
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/frame_check.hpp"
 #include "deploy/cli/map_commands.hpp"
 #include "deploy/cli/mcap_export.hpp"
 #include "deploy/cli/slam_results.hpp"
@@ -25,6 +26,7 @@ struct ExportOptions {
   std::filesystem::path out;
   std::vector<std::string> formats{"tum", "csv", "g2o"};
   std::string frame_of;  ///< A map file in whose frame the drive was.
+  bool force = false;    ///< Also where landmarks do not show it.
 };
 
 SlamResults read_results(const std::string& log) {
@@ -74,6 +76,12 @@ model::MapReference frame_of_drive(const ExportOptions& options) {
   return *reference;
 }
 
+/// By the landmarks of the drive's map.
+void check_frame(const ExportOptions& options, const SlamResults& results) {
+  const map_file::MapFile file(options.frame_of, map_file::Access::kRead);
+  require_one_frame({options.log, {results.map.whole().value().landmarks}}, maps_in(file));
+}
+
 void export_as(const std::string& format, const SlamResults& results,
                const std::filesystem::path& out) {
   const model::WholeMap map = results.map.whole().value();
@@ -108,6 +116,7 @@ void export_results(const ExportOptions& options) {
     fmt::print(stderr, "{}: {} changes of the map are missing: some landmarks may be old\n", log,
                results.map.missed());
   }
+  if (has_places && !options.force) check_frame(options, results);
   std::filesystem::create_directories(out);
   for (const auto& format : options.formats)
     format == "geojson" ? export_geojson(results, *reference, out)
@@ -176,8 +185,11 @@ void add_export_command(CLI::App& parent) {
       ->delimiter(',')
       ->check(CLI::IsMember({"tum", "kitti", "csv", "g2o", "geojson", "mcap"}))
       ->capture_default_str();
-  command->add_option("--frame-of", options->frame_of,
-                      "A georeferenced map file with which the drive began: for geojson");
+  command->add_option(
+      "--frame-of", options->frame_of,
+      "A georeferenced map file with which the drive began: for geojson; the landmarks "
+      "must show it");
+  command->add_flag("--force", options->force, "--frame-of also where landmarks do not show it");
   command->callback([options] { run(*options); });
 }
 

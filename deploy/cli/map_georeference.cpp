@@ -10,6 +10,7 @@
 #include "common/terminal/interrupt.hpp"
 #include "deploy/cli/common_points.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/frame_check.hpp"
 #include "deploy/cli/map_commands.hpp"
 #include "deploy/cli/map_table.hpp"
 
@@ -37,6 +38,7 @@ struct GeoreferenceOptions {
   std::vector<double> antenna_m{0.0, 0.0};
   std::uint32_t map_id = 0;  ///< 0: the only one with keyframes.
   std::optional<double> most_rms_m;
+  bool force = false;
   bool replace = false;
   bool dry_run = false;
 };
@@ -128,9 +130,11 @@ model::MapReference from_points(const GeoreferenceOptions& options, const MapFil
   return placing.reference;
 }
 
-model::MapReference like_other(const GeoreferenceOptions& options) {
-  const auto reference = MapFile(options.like, map_file::Access::kRead).reference();
+model::MapReference like_other(const GeoreferenceOptions& options, const MapFile& file) {
+  const MapFile other(options.like, map_file::Access::kRead);
+  const auto reference = other.reference();
   if (!reference) fail(fmt::format("{}: is not georeferenced", options.like));
+  if (!options.force) require_one_frame(maps_in(file), maps_in(other));
   return *reference;
 }
 
@@ -139,6 +143,7 @@ void require_one_source(const GeoreferenceOptions& options) {
                       static_cast<int>(!options.fixes.empty()) +
                       static_cast<int>(!options.like.empty());
   if (sources != 1) wrong_usage("map georeference: one of --control-points, --fixes, --like");
+  if (options.force && options.like.empty()) wrong_usage("map georeference: --force is of --like");
   if (options.control_points.empty() != options.crs.empty())
     wrong_usage("map georeference: --crs is the reference system of --control-points");
 }
@@ -152,7 +157,7 @@ void run_map_georeference(const GeoreferenceOptions& options) {
     if (file.reference() && !options.replace)
       fail(fmt::format("{}: is georeferenced already: {} (--replace)", options.file,
                        place_text(*file.reference())));
-    reference = options.like.empty() ? from_points(options, file) : like_other(options);
+    reference = options.like.empty() ? from_points(options, file) : like_other(options, file);
   }
   fmt::print("{}\n", place_text(*reference));
   if (options.dry_run) return fmt::print("nothing was written (--dry-run)\n");
@@ -190,8 +195,11 @@ void add_map_georeference(CLI::App& map) {
       ->expected(2);
   command->add_option("--map", options->map_id, "The map that the fixes are of")
       ->check(CLI::Range(std::uint32_t{1}, map_file::kLastMapId));
-  command->add_option("--like", options->like,
-                      "A map file in whose frame the maps are, since their drive began with it");
+  command->add_option(
+      "--like", options->like,
+      "A map file in whose frame the maps are, since their drive began with it; their "
+      "landmarks must show it");
+  command->add_flag("--force", options->force, "--like also where landmarks do not show it");
 
   command
       ->add_option("--most-rms-m", options->most_rms_m,

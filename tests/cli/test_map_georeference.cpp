@@ -183,7 +183,9 @@ TEST_CASE_METHOD(Plot, "maps of two systems are merged by their landmarks", "[cl
   CHECK(MapFile(map, Access::kRead).reference() == frame);
 
   // One that is placed wrongly shows where the landmarks are the same.
-  fine("map georeference " + other + " --like " + map + " --replace");
+  const std::string placed = "map georeference " + other + " --like " + map + " --replace";
+  refused(placed, 1, "its landmarks do not show the frame of " + map);
+  fine(placed + " --force");
   CHECK_THAT(run("map merge " + map + " " + other).error, Contains("apart by their georeferences"));
   local_map(path("local.gpkg"), geometry::SE2(20.0, 30.0, 0.5));
   CHECK_THAT(run("map merge " + path("local.gpkg") + " " + map).error,
@@ -233,6 +235,7 @@ TEST_CASE_METHOD(Plot, "control points georeference a map, and revert takes it b
               write("none.csv", "landmark_id,east,north\n77,600000,5700000\n"),
           1, "line 2: no landmark 77");
   refused("map georeference " + map, 2, "one of --control-points, --fixes, --like");
+  refused(command + " --force --replace", 2, "--force is of --like");
 }
 
 TEST_CASE_METHOD(Plot, "fixes of a drive georeference its map", "[cli]") {
@@ -354,4 +357,20 @@ TEST_CASE_METHOD(Plot, "a drive in a survey of seven digits is located as in one
         Approx(51.03).margin(0.02));
   refused("export " + path("again.lcm") + " --format geojson --out " + path("no"), 1,
           "--frame-of MAP.gpkg");
+
+  // The drive's own map, and one of elsewhere that is in its frame by chance as little as any.
+  const std::string drive = path("again.gpkg");
+  fine("map import " + path("again.lcm") + " --out " + drive);
+  fine("map georeference " + drive + " --like " + map);
+  CHECK(MapFile(drive, Access::kRead).reference() == MapFile(map, Access::kRead).reference());
+  const std::string elsewhere = path("elsewhere.gpkg");
+  fine("map import " + survey("plot.csv", "EPSG:25832", "east,north") + " --crs EPSG:25832 --out " +
+       elsewhere);
+  refused("map georeference " + drive + " --replace --like " + elsewhere, 1,
+          "its landmarks do not show the frame of " + elsewhere + ": ");
+  const std::string geojson =
+      "export " + path("again.lcm") + " --format geojson --frame-of " + elsewhere + " --out ";
+  refused(geojson + path("no"), 1, "did the drive begin with that map?");
+  CHECK_FALSE(std::filesystem::exists(path("no")));
+  fine(geojson + path("forced") + " --force");
 }

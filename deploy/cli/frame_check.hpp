@@ -1,0 +1,26 @@
+// Whether two maps that are said to be in one frame are, by their landmarks.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/map_file/map_file.hpp"
+#include "common/model/map.hpp"
+
+namespace understory::cli {
+
+/// The landmarks of maps in one frame.
+struct MapsInFrame {
+  std::string source;  ///< The file, for messages.
+  std::vector<std::vector<model::MapLandmark>> maps;
+};
+
+/// All maps of a file.
+MapsInFrame maps_in(const map_file::MapFile& file);
+
+/// Ends the command with numbers unless a map of one has landmarks at the places of those of a map
+/// of the other: as many and as surely as `map merge` wants where somebody says how maps lie.
+/// Linear in the landmarks, for each pair of maps.
+void require_one_frame(const MapsInFrame& first, const MapsInFrame& second);
+
+}  // namespace understory::cli
