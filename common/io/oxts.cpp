@@ -51,7 +51,8 @@ LocalPlane::LocalPlane(double latitude_deg, double longitude_deg)
 }
 
 Eigen::Vector2d LocalPlane::east_north_m(double latitude_deg, double longitude_deg) const {
-  return {(longitude_deg - longitude_deg_) * east_per_deg_m_,
+  // The shorter way round: a drive may cross the date line.
+  return {std::remainder(longitude_deg - longitude_deg_, 360.0) * east_per_deg_m_,
           (latitude_deg - latitude_deg_) * north_per_deg_m_};
 }
 

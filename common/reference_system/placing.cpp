@@ -90,9 +90,7 @@ Placing place_map(const std::string& system, std::span<const CommonPoint> points
   if (placing.reach_m < kLeastReach_m)
     throw ReferenceError("the points lie within 1 m of each other: they show no direction");
 
-  Places world;
-  for (const CommonPoint& one : points) world.push_back(one.world);
-  placing.reference = frame_at(system, middle_of(world));
+  placing.reference = frame_at(system, points.front().world);
   // The north of one place is not that of the next: the frame is looked for where the map has its
   // origin.
   for (int i = 0; i < kMostFrames; ++i) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -91,6 +92,31 @@ std::string definition_of_frame(PJ_CONTEXT* context, PJ* base, const FramePlace&
       datum, projection_text(place, degrees_per_unit));
 }
 
+/// Of an area; west is more than east where it lies across the date line.
+struct Bounds {
+  double west_deg = 0.0;
+  double south_deg = 0.0;
+  double east_deg = 0.0;
+  double north_deg = 0.0;
+};
+
+/// From longitude and latitude to the bounds on a sphere, along a parallel and a meridian; 0 within
+/// them.
+double distance_to(const Bounds& bounds, const Eigen::Vector2d& place_deg) {
+  constexpr double kEarthRadius_m = 6.371e6;
+  const auto turned = [](double degrees) { return degrees - 360.0 * std::floor(degrees / 360.0); };
+  const double width_deg = bounds.east_deg >= bounds.west_deg
+                               ? bounds.east_deg - bounds.west_deg
+                               : bounds.east_deg + 360.0 - bounds.west_deg;
+  const double from_west_deg = turned(place_deg.x() - bounds.west_deg);
+  const double beside_deg =
+      from_west_deg <= width_deg ? 0.0 : std::min(from_west_deg - width_deg, 360.0 - from_west_deg);
+  const double above_deg =
+      std::max({0.0, bounds.south_deg - place_deg.y(), place_deg.y() - bounds.north_deg});
+  return kEarthRadius_m * kPerDegree *
+         std::hypot(above_deg, beside_deg * std::cos(place_deg.y() * kPerDegree));
+}
+
 /// Where the origin of a frame lies; good enough to choose a transformation by.
 Geographic place_of(const model::MapReference& frame) {
   return {frame.latitude_deg, frame.longitude_deg};
@@ -155,7 +181,8 @@ model::MapReference frame_at(const std::string& system, const Eigen::Vector2d& o
   model::MapReference frame;
   frame.system = code_of(found.get());
   frame.latitude_deg = rounded_deg(at_deg.y());
-  const double longitude_deg = rounded_deg(at_deg.x());
+  // A table that lies across the date line may count on behind 180 degrees.
+  const double longitude_deg = rounded_deg(std::remainder(at_deg.x(), 360.0));
   frame.longitude_deg = longitude_deg + prime_meridian_deg(context.get(), base.get());
   frame.rotation_rad = rotation_rad;
   frame.definition =
@@ -172,26 +199,25 @@ Transformation to_wgs84(const model::MapReference& frame) {
   return {frame.definition, kWgs84Code, place_of(frame)};
 }
 
-std::string area_remark(const std::string& system, const Eigen::Vector2d& at) {
+std::optional<OutsideArea> outside_area(const std::string& system, const Eigen::Vector2d& at) {
   const ContextHandle context = new_context();
   const ProjHandle found = horizontal_system(context.get(), system);
-  double west = 0.0;
-  double south = 0.0;
-  double east = 0.0;
-  double north = 0.0;
+  Bounds bounds;
   const char* name = nullptr;
   const bool is_known =
-      proj_get_area_of_use(context.get(), found.get(), &west, &south, &east, &north, &name) != 0;
-  if (!is_known || west > east) return {};
+      proj_get_area_of_use(context.get(), found.get(), &bounds.west_deg, &bounds.south_deg,
+                           &bounds.east_deg, &bounds.north_deg, &name) != 0;
+  if (!is_known) return std::nullopt;
 
   const Eigen::Vector2d place = Transformation(system, kWgs84Code).forward(at);
-  const bool is_inside =
-      place.x() >= west && place.x() <= east && place.y() >= south && place.y() <= north;
-  if (is_inside) return {};
-  return fmt::format(
-      "latitude {:.4f}, longitude {:.4f} is outside of the area of {} ({}): are the columns "
-      "swapped, or is it another system?",
-      place.y(), place.x(), code_of(found.get()), name == nullptr ? "unnamed" : name);
+  const double distance_m = distance_to(bounds, place);
+  if (distance_m <= 0.0) return std::nullopt;
+  return OutsideArea{
+      distance_m,
+      fmt::format("latitude {:.4f}, longitude {:.4f} is {:.0f} km outside of the area of {} ({}): "
+                  "are the columns swapped, or is it another system?",
+                  place.y(), place.x(), std::ceil(1e-3 * distance_m), code_of(found.get()),
+                  name == nullptr ? "unnamed" : name)};
 }
 
 }  // namespace understory::reference_system

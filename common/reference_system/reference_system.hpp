@@ -75,8 +75,13 @@ Transformation into_frame(const std::string& system, const model::MapReference& 
 /// Metres of a map's frame to longitude and latitude [deg] of WGS 84.
 Transformation to_wgs84(const model::MapReference& frame);
 
-/// A remark where a place is not in the area for which the system is made, e.g. since the columns
-/// are swapped; empty where it is.
-std::string area_remark(const std::string& system, const Eigen::Vector2d& at);
+/// A place that is not in the area for which a system is made.
+struct OutsideArea {
+  double distance_m = 0.0;  ///< From the area, by its bounds of latitude and longitude.
+  std::string text;         ///< What it is, for people.
+};
+/// E.g. since the columns are swapped; none where the place is in the area, or the system states
+/// none.
+std::optional<OutsideArea> outside_area(const std::string& system, const Eigen::Vector2d& at);
 
 }  // namespace understory::reference_system

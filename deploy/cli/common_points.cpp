@@ -114,8 +114,9 @@ std::optional<Fix> fix_at(const std::vector<Fix>& fixes, model::Utime utime) {
   const model::Utime gap = after->utime - before.utime;
   if (gap > kLongestGap_us) return std::nullopt;
   const double share = static_cast<double>(utime - before.utime) / static_cast<double>(gap);
-  return Fix{utime, before.at_deg + share * (after->at_deg - before.at_deg),
-             std::max(before.sigma_m, after->sigma_m)};
+  Eigen::Vector2d step_deg = after->at_deg - before.at_deg;
+  step_deg.x() = std::remainder(step_deg.x(), 360.0);  // Over the date line, too.
+  return Fix{utime, before.at_deg + share * step_deg, std::max(before.sigma_m, after->sigma_m)};
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "common/reference_system/reference_system.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/geojson_geometry.hpp"
 #include "deploy/cli/map_commands.hpp"
 #include "deploy/cli/slam_results.hpp"
 #include "deploy/cli/text_file.hpp"
@@ -31,15 +32,14 @@ class Earth {
   explicit Earth(const model::MapReference& reference)
       : wgs84_(reference_system::to_wgs84(reference)) {}
 
-  Json place(const Eigen::Vector2d& position_m) const {
-    const Eigen::Vector2d at_deg = wgs84_.forward(position_m);
-    return {rounded(at_deg.x()), rounded(at_deg.y())};
+  Eigen::Vector2d place_deg(const Eigen::Vector2d& position_m) const {
+    return wgs84_.forward(position_m);
+  }
+  Json point(const Eigen::Vector2d& position_m) const {
+    return point_geometry(place_deg(position_m));
   }
 
  private:
-  /// To 0.1 mm.
-  static double rounded(double degrees) { return std::round(degrees * 1e9) / 1e9; }
-
   reference_system::Transformation wgs84_;
 };
 
@@ -60,9 +60,9 @@ Json matrix_json(const Eigen::Matrix<double, N, N>& matrix) {
   return rows;
 }
 
-Json feature(const char* kind, Json coordinates, Json properties) {
+Json feature(Json geometry, Json properties) {
   return {{"type", "Feature"},
-          {"geometry", {{"type", kind}, {"coordinates", std::move(coordinates)}}},
+          {"geometry", std::move(geometry)},
           {"properties", std::move(properties)}};
 }
 
@@ -83,7 +83,7 @@ Json landmark_features(const map_file::StoredMap& map, const Earth& earth) {
     const bool is_trunk = landmark.kind == model::LandmarkKind::kTrunk;
     const auto told = existence.find(landmark.id);
     features.push_back(
-        feature("Point", earth.place(landmark.position_m),
+        feature(earth.point(landmark.position_m),
                 {{"landmark_id", landmark.id},
                  {"submap_id", or_null(one.submap_id)},
                  {"covariance_m2", matrix_json(landmark.covariance_m2)},
@@ -99,7 +99,7 @@ Json landmark_features(const map_file::StoredMap& map, const Earth& earth) {
 Json keyframe_features(const map_file::StoredMap& map, const Earth& earth) {
   Json features = Json::array();
   for (const model::KeyframePose& pose : map.keyframes) {
-    features.push_back(feature("Point", earth.place(pose.map_T_vehicle.translation()),
+    features.push_back(feature(earth.point(pose.map_T_vehicle.translation()),
                                {{"sequence", pose.keyframe_sequence},
                                 {"utime", pose.utime},
                                 {"heading_rad", pose.map_T_vehicle.theta()},
@@ -111,11 +111,10 @@ Json keyframe_features(const map_file::StoredMap& map, const Earth& earth) {
 Json border_features(const map_file::StoredMap& map, const Earth& earth) {
   Json features = Json::array();
   for (const map_file::SubmapBorder& border : map.submap_borders) {
-    Json ring = Json::array();
-    for (const Eigen::Vector2d& corner : border.corners_m) ring.push_back(earth.place(corner));
-    ring.push_back(earth.place(border.corners_m.front()));
-    features.push_back(
-        feature("Polygon", Json::array({std::move(ring)}), {{"submap_id", border.submap_id}}));
+    PlacesDeg corners;
+    for (const Eigen::Vector2d& corner : border.corners_m)
+      corners.push_back(earth.place_deg(corner));
+    features.push_back(feature(polygon_geometry(corners), {{"submap_id", border.submap_id}}));
   }
   return features;
 }
@@ -124,7 +123,7 @@ Json loop_features(const map_file::StoredMap& map, const Earth& earth) {
   Json features = Json::array();
   for (const map_file::LoopClosure& loop : map.loop_closures) {
     features.push_back(
-        feature("LineString", Json::array({earth.place(loop.from_m), earth.place(loop.to_m)}),
+        feature(line_geometry({earth.place_deg(loop.from_m), earth.place_deg(loop.to_m)}),
                 {{"from_sequence", loop.from_sequence}, {"to_sequence", loop.to_sequence}}));
   }
   return features;

@@ -116,6 +116,8 @@ model::MapReference from_points(const GeoreferenceOptions& options, const MapFil
       is_by_hand ? control_points_in(options.control_points, options.crs, all_maps(file))
                  : fixes_at_keyframes(options.fixes, driven_map(file, options.map_id),
                                       {{options.antenna_m[0], options.antenna_m[1]}});
+  if (is_by_hand && !known.points.empty())
+    check_area(options.control_points, options.crs, known.points.front().world, options.force);
   const Placing placing =
       reference_system::place_map(is_by_hand ? options.crs : "EPSG:4326", known.points);
   print_placing(known, placing, is_by_hand);
@@ -143,7 +145,8 @@ void require_one_source(const GeoreferenceOptions& options) {
                       static_cast<int>(!options.fixes.empty()) +
                       static_cast<int>(!options.like.empty());
   if (sources != 1) wrong_usage("map georeference: one of --control-points, --fixes, --like");
-  if (options.force && options.like.empty()) wrong_usage("map georeference: --force is of --like");
+  if (options.force && !options.fixes.empty())
+    wrong_usage("map georeference: --force is of --like and --control-points");
   if (options.control_points.empty() != options.crs.empty())
     wrong_usage("map georeference: --crs is the reference system of --control-points");
 }
@@ -199,7 +202,10 @@ void add_map_georeference(CLI::App& map) {
       "--like", options->like,
       "A map file in whose frame the maps are, since their drive began with it; their "
       "landmarks must show it");
-  command->add_flag("--force", options->force, "--like also where landmarks do not show it");
+  command->add_flag(
+      "--force", options->force,
+      "--like also where landmarks do not show it; control points also more than 1,000 km "
+      "outside of the area of --crs");
 
   command
       ->add_option("--most-rms-m", options->most_rms_m,

@@ -213,6 +213,8 @@ void add_map_import(CLI::App& map) {
       "--crs", options->table.crs,
       "Reference system of the table: EPSG:25832, EPSG:4326, ... Coordinates become "
       "metres near the map's origin, and the file says where that lies");
+  command->add_flag("--force", options->table.is_far_allowed,
+                    "Also coordinates more than 1,000 km outside of the area of --crs");
   command->add_flag("--same-frame", options->same_frame,
                     "Coordinates are metres in the frame of the maps that --out has (a log: its "
                     "drive began with one of them)");

@@ -25,6 +25,8 @@ constexpr std::size_t kMostRemarks = 10;
 /// A chosen origin is a multiple of this, in metres or in thousandths of a degree.
 constexpr double kOriginStep = 100.0;
 constexpr double kWidest_m = 2e5;
+/// Systems are used beside their areas: Norway's UTM zone 33 for all of the country, 550 km beyond.
+constexpr double kFarOutside_m = 1e6;
 /// A transformation between datums that is known better is not spoken of [m].
 constexpr double kWellKnown_m = 0.01;
 
@@ -79,6 +81,15 @@ Eigen::Vector2d origin_for(const MapTableOptions& options, const Rows& rows, boo
   }
   const double step = is_degrees ? 1e-3 : kOriginStep;
   return (0.5 / step * (low + high)).array().round().matrix() * step;
+}
+
+/// Longitudes behind the date line go on from those before it.
+void count_on_from_first(Rows& rows) {
+  const double first_deg = rows.front().landmark.position_m.x();
+  for (io::LandmarkRow& row : rows) {
+    double& longitude_deg = row.landmark.position_m.x();
+    longitude_deg += 360.0 * std::round((first_deg - longitude_deg) / 360.0);
+  }
 }
 
 /// Rows of a system become metres of the frame.
@@ -141,6 +152,7 @@ MapOfTable map_of_table(const MapTableOptions& options,
   const io::CoordinateUnit unit{system.is_geographic, system.is_geographic ? 1.0 : system.unit,
                                 true};
   Rows rows = rows_of(options, unit).rows;
+  if (system.is_geographic) count_on_from_first(rows);
 
   // Rows in degrees and in metres become coordinates in the system's own units by one factor.
   const double unit_m = system.unit;
@@ -149,9 +161,8 @@ MapOfTable map_of_table(const MapTableOptions& options,
       options.origin.empty() || system.is_geographic ? Eigen::Vector2d(origin / unit_m) : origin;
   const model::MapReference reference =
       frame ? *frame : reference_system::frame_at(options.crs, in_system);
-  const std::string remark =
-      reference_system::area_remark(options.crs, rows.front().landmark.position_m / unit_m);
-  if (!remark.empty()) report(options, remark);
+  check_area(options.source, options.crs, rows.front().landmark.position_m / unit_m,
+             options.is_far_allowed);
 
   const Transformation into = reference_system::into_frame(options.crs, reference);
   move_into(options, into, unit_m, rows);
@@ -160,6 +171,16 @@ MapOfTable map_of_table(const MapTableOptions& options,
   report(options, fmt::format("{} ({}), {}", system.code, system.name,
                               frame ? "into the frame of the file's maps" : place_text(reference)));
   return {map_with_rows(options, rows), reference};
+}
+
+void check_area(const std::string& source, const std::string& crs, const Eigen::Vector2d& at,
+                bool is_far_allowed) {
+  const auto outside = reference_system::outside_area(crs, at);
+  if (!outside) return;
+  if (outside->distance_m > kFarOutside_m && !is_far_allowed)
+    throw io::DataError(
+        fmt::format("{}: {} (--force takes it all the same)", source, outside->text));
+  fmt::print(stderr, "{}: {}\n", source, outside->text);
 }
 
 std::string place_text(const model::MapReference& reference) {

@@ -18,6 +18,7 @@ struct MapTableOptions {
   std::uint32_t map_id = 0;    ///< 1 or more; 0 where the caller has still to choose.
   double sigma_m = 0.1;
   double near_m = 0.1;
+  bool is_far_allowed = false;  ///< See check_area().
 };
 
 /// A map, and where its frame lies.
@@ -33,6 +34,12 @@ struct MapOfTable {
 /// reference_system::ReferenceError.
 MapOfTable map_of_table(const MapTableOptions& options,
                         const std::optional<model::MapReference>& frame);
+
+/// A remark to stderr where coordinates are outside of the area that their reference system is made
+/// for. Throws io::DataError where that is more than 1,000 km and not allowed: then columns are
+/// swapped, or it is another system.
+void check_area(const std::string& source, const std::string& crs, const Eigen::Vector2d& at,
+                bool is_far_allowed);
 
 /// What is said of a frame's place, for people: "EPSG:25832, origin at latitude 51.03193,
 /// longitude 7.59147".

@@ -158,10 +158,18 @@ TEST_CASE_METHOD(Plot, "systems and tables that do not go together are refused b
   }
   refused("map import " + survey("d.csv", "EPSG:4326", "lat,lon") + " --out " + map, 1,
           "--crs EPSG:4326");
-  // Columns the wrong way round are said, as far as that shows.
-  const Outcome swapped = run("map import " + write("w.csv", "y,x\n401234,5654321\n") +
-                              " --crs EPSG:25832 --out " + map);
-  CHECK_THAT(swapped.error, Contains("swapped"));
+  // Columns the wrong way round, as far as that shows.
+  const std::string swapped =
+      "map import " + write("w.csv", "y,x\n401234,5654321\n") + " --crs EPSG:25832 --out " + map;
+  refused(swapped, 1, "km outside of the area of EPSG:25832");
+  CHECK_FALSE(std::filesystem::exists(map));
+  CHECK_THAT(run(swapped + " --force").error, Contains("are the columns swapped"));
+  CHECK(std::filesystem::exists(map));
+  // A zone is used beside its area: a remark alone.
+  const Outcome beside = run("map import " + write("b.csv", "x,y\n740600,5766000\n") +
+                             " --crs EPSG:25832 --out " + path("beside.gpkg"));
+  CHECK(beside.status == 0);
+  CHECK_THAT(beside.error, Contains("km outside of the area of EPSG:25832"));
 }
 
 TEST_CASE_METHOD(Plot, "maps of two systems are merged by their landmarks", "[cli]") {
@@ -220,13 +228,15 @@ TEST_CASE_METHOD(Plot, "control points georeference a map, and revert takes it b
   CHECK_FALSE(MapFile(map, Access::kRead).reference());
   check(map);
 
-  // Swapped columns mirror the points: no map fits.
-  const Outcome swapped = run("map georeference " + map + " --crs EPSG:32632 --control-points " +
+  // Swapped columns are elsewhere; they mirror the points, so no map fits.
+  const std::string swapped = "map georeference " + map + " --crs EPSG:32632 --control-points " +
                               write("swapped.csv",
                                     "map_x_m,map_y_m,north,east\n0,0,600000,5700000\n"
-                                    "100,0,600100,5700000\n0,50,600000,5700050\n"));
-  CHECK(swapped.status == 1);
-  CHECK_THAT(swapped.error, Contains("not placed"));
+                                    "100,0,600100,5700000\n0,50,600000,5700050\n");
+  refused(swapped, 1, "km outside of the area of EPSG:32632");
+  const Outcome forced = run(swapped + " --force");
+  CHECK(forced.status == 1);
+  CHECK_THAT(forced.error, Contains("not placed"));
   CHECK_FALSE(MapFile(map, Access::kRead).reference());
   refused("map georeference " + map + " --crs EPSG:32632 --control-points " +
               write("one.csv", "map_x_m,map_y_m,east,north\n0,0,600000,5700000\n"),
@@ -235,7 +245,7 @@ TEST_CASE_METHOD(Plot, "control points georeference a map, and revert takes it b
               write("none.csv", "landmark_id,east,north\n77,600000,5700000\n"),
           1, "line 2: no landmark 77");
   refused("map georeference " + map, 2, "one of --control-points, --fixes, --like");
-  refused(command + " --force --replace", 2, "--force is of --like");
+  refused("map georeference " + map + " --fixes none.lcm --force", 2, "--force is of --like");
 }
 
 TEST_CASE_METHOD(Plot, "fixes of a drive georeference its map", "[cli]") {
@@ -317,6 +327,57 @@ TEST_CASE_METHOD(Plot, "GeoJSON is longitude and latitude of WGS 84", "[cli]") {
   fine("map export " + path("local.gpkg") + " --out " + path("csv"));
   CHECK(std::filesystem::exists(directory / "csv" / "map-1" / "landmarks.csv"));
   CHECK_FALSE(std::filesystem::exists(directory / "csv" / "map-1" / "landmarks.geojson"));
+}
+
+TEST_CASE_METHOD(CommandFolder,
+                 "a map across the date line is one map, and is cut there in GeoJSON", "[cli]") {
+  const auto path = [&](const std::string& name) { return (directory / name).string(); };
+  const std::string map = path("taveuni.gpkg");
+  std::ofstream(path("stems.csv")) << "lat,lon\n-16.8,179.99\n-16.8,-179.99\n-16.801,180.001\n";
+  fine("map import " + path("stems.csv") + " --crs EPSG:4326 --out " + map);
+  StoredMap stored = MapFile(map, Access::kRead).read(1);
+  // 0.02 degrees at this latitude.
+  CHECK((stored.landmarks[1].landmark.position_m - stored.landmarks[0].landmark.position_m).x() ==
+        Approx(2132.0).margin(5.0));
+
+  // A square of 200 m, and a loop, over the line.
+  stored.submap_borders = {{1, {{-100, -100}, {100, -100}, {100, 100}, {-100, 100}}}};
+  stored.loop_closures.emplace_back();
+  stored.loop_closures.back().from_m = {-500.0, 0.0};
+  stored.loop_closures.back().to_m = {500.0, 0.0};
+  map_file::MapFile(map, Access::kWrite).put(std::vector<StoredMap>{stored}, note("borders"));
+  fine("map export " + map + " --format geojson --out " + path("out"));
+  const std::filesystem::path out = directory / "out" / "map-1";
+  std::vector<double> longitudes;
+  const nlohmann::json landmarks = layer_in(out / "landmarks.geojson");
+  for (const auto& feature : landmarks["features"])
+    longitudes.push_back(feature["geometry"]["coordinates"][0].get<double>());
+  CHECK(longitudes[0] == Approx(179.99).margin(1e-6));
+  CHECK(longitudes[1] == Approx(-179.99).margin(1e-6));
+  CHECK(longitudes[2] == Approx(-179.999).margin(1e-6));
+
+  const auto border = layer_in(out / "submap_borders.geojson")["features"][0]["geometry"];
+  CHECK(border["type"] == "MultiPolygon");
+  REQUIRE(border["coordinates"].size() == 2);
+  for (const auto& part : border["coordinates"]) {
+    const auto& ring = part[0];
+    REQUIRE(ring.size() == 5);
+    CHECK(ring.front() == ring.back());
+    double area_deg2 = 0.0;
+    for (std::size_t i = 0; i + 1 < ring.size(); ++i) {
+      const double x = ring[i][0];
+      const double next_x = ring[i + 1][0];
+      CHECK(std::abs(next_x - x) < 0.01);
+      area_deg2 += 0.5 * (x * ring[i + 1][1].get<double>() - next_x * ring[i][1].get<double>());
+    }
+    CHECK(area_deg2 > 0.0);  // Counter-clockwise, as RFC 7946 wants outer rings.
+  }
+  const auto loop = layer_in(out / "loop_closures.geojson")["features"][0]["geometry"];
+  CHECK(loop["type"] == "MultiLineString");
+  REQUIRE(loop["coordinates"].size() == 2);
+  CHECK(loop["coordinates"][0][1][0] == 180.0);
+  CHECK(loop["coordinates"][1][0][0] == -180.0);
+  CHECK(loop["coordinates"][0][1][1] == loop["coordinates"][1][0][1]);
 }
 
 TEST_CASE_METHOD(Plot, "a drive in a survey of seven digits is located as in one near 0", "[cli]") {

@@ -101,6 +101,14 @@ TEST_CASE("the reduced KITTI drive is read with its poses", "[kitti][recorded]")
   CHECK_THROWS_AS(ReducedKitti(folder, "gps"), DataError);
 }
 
+TEST_CASE("metres of fixes go on across the date line", "[oxts]") {
+  const LocalPlane plane(-17.0, 179.9999);
+  const Eigen::Vector2d before = plane.east_north_m(-17.0, 179.9998);
+  const Eigen::Vector2d behind = plane.east_north_m(-17.0, -179.9999);
+  CHECK(before.x() == Approx(-10.65).margin(0.05));
+  CHECK(behind.x() == Approx(21.3).margin(0.1));
+}
+
 TEST_CASE("dates are read as ISO 8601 writes them", "[date]") {
   constexpr model::Utime kTime = 1'317'042'164'335'092;
   const auto parsed = [](std::string_view text) { return parse_date_times(text, "t"); };

@@ -1,4 +1,5 @@
 // The place of a map from points that are known in both.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -68,6 +69,18 @@ TEST_CASE("a map is found where it lies, whatever its frame and its distance fro
       CHECK(apart_m(placing.reference, frame, middle_m) < 1e-4);
     }
   }
+}
+
+TEST_CASE("points on both sides of the date line place one map", "[reference_system]") {
+  std::mt19937_64 random(65);
+  const auto frame = frame_at("EPSG:4326", {179.9999, -16.8}, 0.7);
+  const auto points = points_of("EPSG:4326", frame, {0.0, 0.0}, 0.0, 20, random);
+  const auto longitude = [](const CommonPoint& one) { return one.world.x(); };
+  REQUIRE(std::ranges::max(points, {}, longitude).world.x() > 179.0);
+  REQUIRE(std::ranges::min(points, {}, longitude).world.x() < -179.0);
+  const Placing placing = place_map("EPSG:4326", points);
+  CHECK(placing.rms_m < 1e-4);
+  CHECK(apart_m(placing.reference, frame, {0.0, 0.0}) < 1e-4);
 }
 
 TEST_CASE("residuals are what the points are off by, and wild ones pull little",

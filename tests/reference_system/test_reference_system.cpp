@@ -198,9 +198,27 @@ TEST_CASE("places beyond a system's reach and area are told", "[reference_system
   const auto frame = frame_at("EPSG:25832", {401234.0, 5654321.0});
   CHECK_THROWS_AS(into_frame("EPSG:4326", frame).forward({7.0, 95.0}), ReferenceError);
   CHECK_THROWS_AS(frame_at("EPSG:4326", {7.0, 89.5}), ReferenceError);
-  CHECK(area_remark("EPSG:25832", {401234.0, 5654321.0}).empty());
-  CHECK_THAT(area_remark("EPSG:25832", {5654321.0, 401234.0}), Contains("swapped"));
-  CHECK_THAT(area_remark("EPSG:27700", {5300000.0, 180000.0}), Contains("EPSG:27700"));
+  CHECK_FALSE(outside_area("EPSG:25832", {401234.0, 5654321.0}));
+  const auto swapped = outside_area("EPSG:25832", {5654321.0, 401234.0});
+  REQUIRE(swapped);
+  CHECK_THAT(swapped->text, Contains("swapped") && Contains("EPSG:25832"));
+  CHECK(swapped->distance_m > 2e6);
+  // Half a degree east of the zone at 52 degrees of latitude.
+  const auto beside = outside_area("EPSG:25832", {740600.0, 5766000.0});
+  REQUIRE(beside);
+  CHECK(beside->distance_m == Approx(34e3).margin(1e3));
+  CHECK_THAT(beside->text,
+             Contains("is 35 km outside of the area") || Contains("is 34 km outside"));
+  CHECK(outside_area("EPSG:27700", {5300000.0, 180000.0})->distance_m > 1e6);
+
+  // Fiji's system lies across the date line, from 176.81 to -178.15.
+  const Transformation into("EPSG:4326", "EPSG:3460");
+  for (const double longitude_deg : {177.0, 179.99, -179.99, -179.0})
+    CHECK_FALSE(outside_area("EPSG:3460", into.forward({longitude_deg, -17.0})));
+  CHECK(outside_area("EPSG:3460", into.forward({175.81, -17.0}))->distance_m ==
+        Approx(106e3).margin(2e3));
+  CHECK(outside_area("EPSG:3460", into.forward({-177.15, -17.0}))->distance_m ==
+        Approx(106e3).margin(2e3));
 }
 
 TEST_CASE("how well two datums are known to each other is told", "[reference_system]") {
