@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "common/bag/cloud_fields.hpp"
-#include "common/bag/ring_finder.hpp"
 #include "common/io/data_error.hpp"
+#include "common/io/ring_finder.hpp"
 
 namespace understory::bag {
 namespace {
@@ -161,7 +161,7 @@ bool CloudDecoder::take_found_rings(std::vector<RawPoint>& points) {
   std::vector<Eigen::Vector3f> positions_m;
   positions_m.reserve(points.size());
   for (const RawPoint& point : points) positions_m.push_back(point.position_m);
-  const FoundRings found = find_rings(positions_m);
+  const io::FoundRings found = io::find_rings(positions_m);
   if (found.ring.empty()) return false;
 
   for (std::size_t i = 0; i < points.size(); ++i) points[i].ring = found.ring[i];

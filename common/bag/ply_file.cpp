@@ -9,6 +9,7 @@
 #include "common/bag/cloud_file.hpp"
 #include "common/bag/text_points.hpp"
 #include "common/io/data_error.hpp"
+#include "common/io/kitti_raw.hpp"
 
 namespace understory::bag {
 namespace {
@@ -127,10 +128,7 @@ CloudFile parse_ply(std::string_view bytes, std::string_view source) {
 CloudFile parse_kitti_bin(std::string_view bytes, std::string_view source) {
   const std::array<TextField, 4> fields{TextField{"x"}, TextField{"y"}, TextField{"z"},
                                         TextField{"intensity"}};
-  CloudFile file = unordered(fields, bytes.size() / 16);
-  if (bytes.size() % file.cloud.point_step != 0)
-    refuse_ply(source, fmt::format("{} bytes are no whole points of {} (x, y, z, intensity)",
-                                   bytes.size(), file.cloud.point_step));
+  CloudFile file = unordered(fields, io::kitti::points_in(bytes, source));
   file.points.assign(bytes.begin(), bytes.end());
   file.cloud.data = file.points;
   return file;

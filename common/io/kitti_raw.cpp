@@ -12,6 +12,7 @@
 #include "common/io/date_time.hpp"
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
+#include "common/io/ring_finder.hpp"
 
 namespace understory::io {
 namespace fs = std::filesystem;
@@ -22,35 +23,42 @@ constexpr std::size_t kPointBytes = 16;
 
 }  // namespace
 
+std::size_t points_in(std::string_view bytes, std::string_view source) {
+  if (bytes.size() % kPointBytes != 0)
+    throw DataError(fmt::format("{}: {} bytes are no whole points of {} (x, y, z, intensity)",
+                                source, bytes.size(), kPointBytes));
+  return bytes.size() / kPointBytes;
+}
+
 model::PointSweep parse_points(std::string_view bytes, double revolution_s,
                                std::string_view source) {
-  if (bytes.size() % kPointBytes != 0)
-    throw DataError(
-        fmt::format("{}: {} bytes are no whole points of {}", source, bytes.size(), kPointBytes));
+  std::vector<Eigen::Vector3f> positions(points_in(bytes, source));
+  std::vector<float> reflectances(positions.size());
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    std::memcpy(positions[i].data(), bytes.data() + kPointBytes * i, 3 * sizeof(float));
+    std::memcpy(&reflectances[i], bytes.data() + kPointBytes * i + 3 * sizeof(float),
+                sizeof(float));
+  }
+  // From ahead to the left, the highest beam first.
+  const RingTurns beams = find_turns(positions, 0.0);
+  if (beams.turn.size() != positions.size())
+    throw DataError(fmt::format("{}: its points are not ring after ring", source));
 
   model::PointSweep sweep;
   sweep.rings = kitti::kRings;
   sweep.max_range_m = kitti::kMaxRange_m;
-  sweep.points.reserve(bytes.size() / kPointBytes);
-  int beam = 0;  // from the top
-  float last = 0.0F;
-
-  for (std::size_t at = 0; at < bytes.size(); at += kPointBytes) {
-    std::array<float, 4> v{};
-    std::memcpy(v.data(), bytes.data() + at, kPointBytes);
+  sweep.points.reserve(positions.size());
+  for (std::size_t i = 0; i < positions.size(); ++i) {
     model::SweepPoint point;
-    point.x_m = v[0];
-    point.y_m = v[1];
-    point.z_m = v[2];
-    point.intensity = static_cast<std::uint8_t>(std::clamp(v[3] * 255.0F, 0.0F, 255.0F));
-
-    const float azimuth = std::atan2(v[1], v[0]);
-    const float around = azimuth < 0.0F ? azimuth + 2.0F * std::numbers::pi_v<float> : azimuth;
-    if (around < last - std::numbers::pi_v<float>) ++beam;
-    last = around;
-    point.ring = static_cast<std::uint16_t>(std::max(0, kitti::kRings - 1 - beam));
+    point.x_m = positions[i].x();
+    point.y_m = positions[i].y();
+    point.z_m = positions[i].z();
+    point.intensity = static_cast<std::uint8_t>(std::clamp(reflectances[i] * 255.0F, 0.0F, 255.0F));
+    point.ring = static_cast<std::uint16_t>(
+        std::max(0, kitti::kRings - 1 - static_cast<int>(beams.turn[i])));
 
     // From behind the car, clockwise.
+    const float azimuth = std::atan2(point.y_m, point.x_m);
     point.time_s =
         static_cast<float>(revolution_s) * 0.5F * (1.0F - azimuth / std::numbers::pi_v<float>);
     if (std::isfinite(point.time_s)) sweep.points.push_back(point);

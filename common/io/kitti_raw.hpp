@@ -51,6 +51,8 @@ constexpr std::uint16_t kRings = 64;
 /// calib_imu_to_velo.txt in the plane.
 inline geometry::SE2 vehicle_T_laser() { return {0.8105, -0.3072, 0.00076}; }
 
+/// Number of points (x, y, z, reflectance as float32) of a .bin file. Throws DataError.
+std::size_t points_in(std::string_view bytes, std::string_view source);
 /// Bytes of a .bin file to points with rings and times within `revolution_s`. Throws DataError.
 model::PointSweep parse_points(std::string_view bytes, double revolution_s,
                                std::string_view source);

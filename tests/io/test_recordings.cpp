@@ -1,4 +1,5 @@
 // KITTI drives, packet captures and tables.
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -130,6 +131,15 @@ TEST_CASE("dates are read as ISO 8601 writes them", "[date]") {
 
 TEST_CASE("KITTI's texts are checked", "[kitti]") {
   CHECK_THROWS_AS(kitti::parse_points("123", 0.1, "p"), DataError);
+  CHECK(kitti::parse_points("", 0.1, "p").points.empty());
+  std::string shuffled(16 * 300, '\0');
+  for (std::size_t i = 0; i < 300; ++i) {
+    const float place[] = {std::cos(2.4F * static_cast<float>(i * i)),
+                           std::sin(2.4F * static_cast<float>(i * i)), 0.0F};
+    std::memcpy(shuffled.data() + 16 * i, place, sizeof place);
+  }
+  CHECK_THROWS_WITH(kitti::parse_points(shuffled, 0.1, "p"),
+                    "p: its points are not ring after ring");
   CHECK_THROWS_AS(parse_oxts("49.0 8.4 116", "o"), DataError);
   CHECK_THROWS_AS(kitti::parse_transform("a\nR: 1 0 0 0 1 0 0 0 2\nT: 0 0 0\n", "c"), DataError);
   CHECK_THROWS_AS(KittiRaw("/nowhere"), DataError);

@@ -7,7 +7,15 @@
 #include <string_view>
 #include <vector>
 
-namespace understory::bag {
+namespace understory::io {
+
+/// The turn of the azimuth that each point belongs to, 0 = the first, where a file has ring after
+/// ring (KITTI); empty where the azimuth goes in no one sense. A turn begins at `begin_rad`.
+struct RingTurns {
+  std::vector<std::uint32_t> turn;
+  std::size_t turns = 0;
+};
+RingTurns find_turns(std::span<const Eigen::Vector3f> points_m, double begin_rad);
 
 /// Rings found from points alone.
 struct FoundRings {
@@ -22,4 +30,4 @@ struct FoundRings {
 /// several revolutions have neither. n log n in the number of points.
 FoundRings find_rings(std::span<const Eigen::Vector3f> points_m);
 
-}  // namespace understory::bag
+}  // namespace understory::io

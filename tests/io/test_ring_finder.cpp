@@ -1,10 +1,10 @@
 // Rings of clouds that do not say them, against the rings with which they were made.
 #include <algorithm>
 #include <numeric>
+#include <random>
 
-#include "common/bag/ring_finder.hpp"
 #include "common/io/kitti_raw.hpp"
-#include "tests/bag/cloud_writer.hpp"
+#include "common/io/ring_finder.hpp"
 #include "tests/catch.hpp"
 #include "tests/data.hpp"
 
@@ -12,6 +12,8 @@ using namespace understory;
 using namespace understory::test;
 
 namespace {
+
+using Random = std::mt19937_64;
 
 struct Laser {
   std::vector<double> elevations_rad;
@@ -58,7 +60,7 @@ Laser even_laser(std::size_t beams, double from_deg, double to_deg) {
 
 }  // namespace
 
-TEST_CASE("rings are found from elevations, in any order of the points", "[bag][rings]") {
+TEST_CASE("rings are found from elevations, in any order of the points", "[io][rings]") {
   Random random(1);
   std::vector<Laser> lasers{even_laser(16, -15, 15), even_laser(32, -25, 15),
                             even_laser(64, -24.8, 2), even_laser(16, -15, 15)};
@@ -72,7 +74,7 @@ TEST_CASE("rings are found from elevations, in any order of the points", "[bag][
       if (is_shuffled) std::shuffle(order.begin(), order.end(), random);
       std::vector<Eigen::Vector3f> points;
       for (const std::size_t i : order) points.push_back(seen.points_m[i]);
-      const bag::FoundRings found = bag::find_rings(points);
+      const io::FoundRings found = io::find_rings(points);
       CAPTURE(laser.elevations_rad.size(), is_shuffled, found.from);
       REQUIRE(found.rings == laser.elevations_rad.size());
       CHECK(found.from == "elevations");
@@ -84,7 +86,7 @@ TEST_CASE("rings are found from elevations, in any order of the points", "[bag][
   }
 }
 
-TEST_CASE("rings are found from an order by rings, either way and sense", "[bag][rings]") {
+TEST_CASE("rings are found from an order by rings, either way and sense", "[io][rings]") {
   Random random(2);
   // Beams that leave so far from the origin that their elevations overlap.
   Laser laser = even_laser(64, -24.8, 2);
@@ -101,7 +103,7 @@ TEST_CASE("rings are found from an order by rings, either way and sense", "[bag]
       });
       std::vector<Eigen::Vector3f> points;
       for (const std::size_t i : order) points.push_back(seen.points_m[i]);
-      const bag::FoundRings found = bag::find_rings(points);
+      const io::FoundRings found = io::find_rings(points);
       CAPTURE(is_from_top, is_clockwise, begin_rad, found.from);
       REQUIRE(found.rings == 64);
       CHECK(found.from == "the order of the points");
@@ -113,20 +115,19 @@ TEST_CASE("rings are found from an order by rings, either way and sense", "[bag]
   }
 }
 
-TEST_CASE("clouds without beams have no rings", "[bag][rings]") {
+TEST_CASE("clouds without beams have no rings", "[io][rings]") {
   Random random(3);
   std::uniform_real_distribution<float> place(-40.0F, 40.0F);
   for (const std::size_t size : {0, 10, 1000, 50000}) {
     std::vector<Eigen::Vector3f> points(size);
     for (Eigen::Vector3f& point : points) point = {place(random), place(random), place(random)};
-    CHECK(bag::find_rings(points).ring.empty());
+    CHECK(io::find_rings(points).ring.empty());
   }
   // One plane.
-  CHECK(bag::find_rings(revolution_of(random, even_laser(1, 0, 0), 900).points_m).ring.empty());
+  CHECK(io::find_rings(revolution_of(random, even_laser(1, 0, 0), 900).points_m).ring.empty());
 }
 
-TEST_CASE("rings of a recorded cloud without them are those of its file",
-          "[bag][rings][recorded]") {
+TEST_CASE("rings of a recorded cloud without them are those of its file", "[io][rings][recorded]") {
   const io::KittiRaw drive(recording("kitti_raw_drive0002"));
   const model::PointSweep sweep = drive.read_sweep(0);
   // As the file has them: ring by ring from the top, each from ahead to the left.
@@ -140,7 +141,7 @@ TEST_CASE("rings of a recorded cloud without them are those of its file",
   });
   std::vector<Eigen::Vector3f> points;
   for (const model::SweepPoint& point : ordered) points.push_back(point.position());
-  const bag::FoundRings found = bag::find_rings(points);
+  const io::FoundRings found = io::find_rings(points);
   REQUIRE(found.ring.size() == ordered.size());
   // Rings that the file does not reach are missing at the bottom.
   const int lowest = ordered.back().ring;

@@ -1,4 +1,4 @@
-#include "common/bag/ring_finder.hpp"
+#include "common/io/ring_finder.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <numeric>
 #include <optional>
 
-namespace understory::bag {
+namespace understory::io {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -22,61 +22,28 @@ double elevation(const Eigen::Vector3f& point) {
   return static_cast<double>(std::atan2(point.z(), point.head<2>().norm()));
 }
 
-/// Rings that follow each other in the file: the azimuth goes round once in each, in one sense,
-/// from `begin_rad`.
-class OrderedRings {
- public:
-  OrderedRings(std::span<const Eigen::Vector3f> points, double begin_rad)
-      : run_of_(points.size(), 0) {
-    std::size_t forward = 0;
-    double last = 0.0;
-    std::vector<std::size_t> forward_wraps;
-    std::vector<std::size_t> backward_wraps;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const double angle =
-          std::atan2(static_cast<double>(points[i].y()), static_cast<double>(points[i].x()));
-      const double azimuth = angle < begin_rad ? angle + 2.0 * kPi : angle;
-      if (i > 0) {
-        forward += std::remainder(azimuth - last, 2.0 * kPi) > 0.0 ? 1 : 0;
-        if (azimuth < last - kPi) forward_wraps.push_back(i);
-        if (azimuth > last + kPi) backward_wraps.push_back(i);
-      }
-      last = azimuth;
-    }
-    constexpr double kOneSense = 0.9;
-    const double share = static_cast<double>(forward) / static_cast<double>(points.size());
-    if (share > kOneSense) cut(forward_wraps);
-    if (share < 1.0 - kOneSense) cut(backward_wraps);
+RingTurns turns_between(const std::vector<std::size_t>& wraps, std::size_t points) {
+  RingTurns found{{}, wraps.size() + 1};
+  found.turn.reserve(points);
+  std::uint32_t turn = 0;
+  for (std::size_t i = 0; i < points; ++i) {
+    if (turn < wraps.size() && wraps[turn] == i) ++turn;
+    found.turn.push_back(turn);
   }
-
-  std::size_t runs() const { return runs_; }
-  std::size_t run_of(std::size_t point) const { return run_of_[point]; }
-
- private:
-  void cut(const std::vector<std::size_t>& wraps) {
-    runs_ = wraps.size() + 1;
-    std::size_t run = 0;
-    for (std::size_t i = 0; i < run_of_.size(); ++i) {
-      if (run < wraps.size() && wraps[run] == i) ++run;
-      run_of_[i] = static_cast<std::uint32_t>(run);
-    }
-  }
-
-  std::vector<std::uint32_t> run_of_;
-  std::size_t runs_ = 0;
-};
+  return found;
+}
 
 std::optional<FoundRings> rings_by_order(std::span<const Eigen::Vector3f> points,
                                          double begin_rad) {
-  const OrderedRings order(points, begin_rad);
-  if (order.runs() < kFewestBeams || order.runs() > kMostBeams) return std::nullopt;
+  const RingTurns order = find_turns(points, begin_rad);
+  if (order.turns < kFewestBeams || order.turns > kMostBeams) return std::nullopt;
 
   // One beam each: their elevations go one way.
-  std::vector<double> sum(order.runs(), 0.0);
-  std::vector<double> count(order.runs(), 0.0);
+  std::vector<double> sum(order.turns, 0.0);
+  std::vector<double> count(order.turns, 0.0);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    sum[order.run_of(i)] += elevation(points[i]);
-    count[order.run_of(i)] += 1.0;
+    sum[order.turn[i]] += elevation(points[i]);
+    count[order.turn[i]] += 1.0;
   }
   std::size_t upwards = 0;
   for (std::size_t r = 1; r < sum.size(); ++r)
@@ -85,12 +52,12 @@ std::optional<FoundRings> rings_by_order(std::span<const Eigen::Vector3f> points
   const double share = static_cast<double>(upwards) / static_cast<double>(sum.size() - 1);
   if (share < kOneWay && share > 1.0 - kOneWay) return std::nullopt;
 
-  FoundRings found{{}, static_cast<std::uint16_t>(order.runs()), "the order of the points"};
+  FoundRings found{{}, static_cast<std::uint16_t>(order.turns), "the order of the points"};
   found.ring.reserve(points.size());
   const bool is_upwards = share >= kOneWay;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const std::size_t run = order.run_of(i);
-    found.ring.push_back(static_cast<std::uint16_t>(is_upwards ? run : order.runs() - 1 - run));
+    const std::size_t turn = order.turn[i];
+    found.ring.push_back(static_cast<std::uint16_t>(is_upwards ? turn : order.turns - 1 - turn));
   }
   return found;
 }
@@ -163,6 +130,30 @@ std::optional<FoundRings> rings_by_elevation(std::span<const Eigen::Vector3f> po
 
 }  // namespace
 
+RingTurns find_turns(std::span<const Eigen::Vector3f> points_m, double begin_rad) {
+  std::size_t forward = 0;
+  double last = 0.0;
+  std::vector<std::size_t> forward_wraps;
+  std::vector<std::size_t> backward_wraps;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    const double angle =
+        std::atan2(static_cast<double>(points_m[i].y()), static_cast<double>(points_m[i].x()));
+    const double azimuth = angle < begin_rad ? angle + 2.0 * kPi : angle;
+    if (i > 0) {
+      forward += std::remainder(azimuth - last, 2.0 * kPi) > 0.0 ? 1 : 0;
+      if (azimuth < last - kPi) forward_wraps.push_back(i);
+      if (azimuth > last + kPi) backward_wraps.push_back(i);
+    }
+    last = azimuth;
+  }
+
+  constexpr double kOneSense = 0.9;
+  const double share = static_cast<double>(forward) / static_cast<double>(points_m.size());
+  if (share > kOneSense) return turns_between(forward_wraps, points_m.size());
+  if (share < 1.0 - kOneSense) return turns_between(backward_wraps, points_m.size());
+  return {};
+}
+
 FoundRings find_rings(std::span<const Eigen::Vector3f> points_m) {
   if (points_m.size() < kFewestPoints) return {};
   // KITTI begins ahead; what is sorted by atan2 begins behind. Cut elsewhere, rings are one more.
@@ -173,4 +164,4 @@ FoundRings find_rings(std::span<const Eigen::Vector3f> points_m) {
   return rings_by_elevation(points_m).value_or(FoundRings{});
 }
 
-}  // namespace understory::bag
+}  // namespace understory::io
