@@ -59,8 +59,8 @@ std::optional<Eigen::Vector3d> imu_position_m(const Decoder& decoder) {
 }
 
 std::string known_models() {
-  return "vlp16, vlp32c, hdl32e, hdl64e, ouster, mid360, hap, pandar40p, pandar64, pandarqt, xt16, "
-         "xt32, xt32m2x";
+  return "vlp16, vlp32c, hdl32e, hdl64e, ouster, mid360, hap, avia, horizon, mid70, pandar40p, "
+         "pandar64, pandarqt, xt16, xt32, xt32m2x";
 }
 
 Decoder make_decoder(const SensorDescription& sensor) {

@@ -1,37 +1,24 @@
-// Packets of Livox lasers that speak the SDK2 protocol: Mid-360, HAP.
-//
-// After the Mid-360 communication protocol ("Point Cloud Data & IMU Data Protocol") and Livox-SDK2
-// (`livox_lidar_def.h`): a header of 36 bytes, then points or one IMU sample. The pattern never
-// repeats, so there are no revolutions: a sweep is what was measured within a period.
+// Packets of Livox lasers (`livox_packet.hpp`). The pattern never repeats, so there are no
+// revolutions: a sweep is what was measured within a period.
 #pragma once
 
 #include <cstdint>
 #include <optional>
-#include <string_view>
 
+#include "common/packets/livox_packet.hpp"
 #include "common/packets/readings.hpp"
 #include "common/packets/sensor_clock.hpp"
 #include "common/packets/sweep_builder.hpp"
 
 namespace understory::packets {
 
-/// The models that are decoded.
-enum class LivoxModel : std::uint8_t { kMid360, kHap };
-/// By name: "mid360", "hap"; none for another.
-std::optional<LivoxModel> livox_model(std::string_view name);
-/// The name that livox_model() takes.
-std::string_view to_string(LivoxModel model);
-
 /// Where packets are sent to, UDP (Livox-SDK2, `define.h`).
 struct LivoxPorts {
   std::uint16_t points = 56301;
   std::uint16_t imu = 56401;
 };
-/// Of a model as it comes.
+/// Of an SDK2 model as it comes; those of SDK1 are agreed on by laser and host: 0.
 LivoxPorts livox_ports(LivoxModel model);
-
-/// Whether bytes are a point or IMU packet of the SDK2 protocol, whole and consistent.
-bool is_livox_packet(std::span<const std::uint8_t> bytes);
 
 /// Point and IMU packets in, sweeps of a fixed duration and IMU samples out, in frame `sensor` as
 /// the laser has it (x forward, z up). Rings are the lines of the laser's emitters, as Livox's own
@@ -53,13 +40,14 @@ class LivoxStream {
   std::optional<Eigen::Vector3d> imu_position_m() const;
 
  private:
-  void add_points(const Packet& packet, Readings& readings);
-  void add_imu(const Packet& packet, Readings& readings);
+  void add_points(const Packet& packet, const LivoxHeader& header, Readings& readings);
+  void add_imu(const Packet& packet, const LivoxHeader& header, Readings& readings);
+  void count_gap(const LivoxHeader& header);
   void take_time(std::int64_t time_ns, model::Utime received);
   void end_sweep(std::vector<model::PointSweep>& sweeps);
 
   LivoxModel model_;
-  std::uint16_t lines_;
+  LivoxProperties properties_;
   std::int64_t period_ns_;
   double max_range_m_;
   SensorClock clock_;
@@ -69,6 +57,8 @@ class LivoxStream {
   bool has_begin_ = false;              ///< The sweep under way began with its period.
   std::int64_t latest_ns_ = 0;          ///< Of the last point, sensor's clock.
   std::optional<std::uint16_t> packet_number_;
+  std::optional<std::int64_t>
+      next_ns_;  ///< When the next packet of points begins, if none is lost.
   std::uint64_t imu_samples_ = 0;
 };
 

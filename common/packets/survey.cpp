@@ -59,7 +59,19 @@ std::optional<Recognised> recognise_ouster(Payload bytes, std::uint16_t port) {
   return std::nullopt;
 }
 
+/// Six lines and one look alike in the types that both have.
+Recognised recognised_sdk1(Payload bytes) {
+  constexpr std::size_t kTypeAt = 9;
+  constexpr std::uint8_t kSpherical = 1;
+  constexpr std::uint8_t kImu = 6;
+  if (bytes[kTypeAt] == kImu) return {Kind::kImu, "avia", "Livox SDK1 IMU packet"};
+  if (bytes[kTypeAt] <= kSpherical)
+    return {Kind::kPoints, "mid70", "Livox SDK1 point packet, mid70"};
+  return {Kind::kPoints, "avia", "Livox SDK1 point packet, avia (or horizon, mid70: --model)"};
+}
+
 std::optional<Recognised> recognise_livox(Payload bytes, std::uint16_t port) {
+  if (is_livox_sdk1_packet(bytes)) return recognised_sdk1(bytes);
   constexpr std::size_t kTypeAt = 10;
   if (!is_livox_packet(bytes)) return std::nullopt;
   const LivoxPorts hap = livox_ports(LivoxModel::kHap);

@@ -25,6 +25,9 @@ struct CaptureFixture {
 
   /// The options that the import needs.
   std::string describe(const MadeUpSensor& sensor) {
+    // The packets of Livox's SDK1 lasers are the same.
+    const auto livox = packets::livox_model(sensor.description.model);
+    if (livox && packets::speaks_sdk1(*livox)) return " --model " + sensor.description.model;
     if (sensor.description.description.empty()) return {};
     const auto file = directory / sensor.description.source;
     std::ofstream(file) << sensor.description.description;
