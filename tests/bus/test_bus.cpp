@@ -6,6 +6,7 @@
 
 #include "common/bus/bulk_group.hpp"
 #include "common/bus/faulty_bus.hpp"
+#include "common/bus/late_bus.hpp"
 #include "common/bus/live_bus.hpp"
 #include "common/bus/memory_bus.hpp"
 #include "tests/catch.hpp"
@@ -204,4 +205,45 @@ TEST_CASE("faults are counted, seeded, and together make up all messages") {
 
   CHECK(run(1) == run(1));
   CHECK(run(1) != run(2));
+}
+
+TEST_CASE("what is late comes in one burst, whole and in its order, before what follows from it") {
+  MemoryBus inner(MemoryBus::Queues::kUnlimited);
+  LateBus bus(inner);
+  std::string heard;
+  const auto note = [&](const BusMessage& message) {
+    heard += std::string(message.channel) + std::to_string(message.bytes[0]) + " ";
+  };
+  bus.subscribe("A", 1, [&](const BusMessage& message) {
+    note(message);
+    bus.publish("ANSWER", message.bytes);
+  });
+  bus.subscribe("B", 1, note);
+  inner.subscribe("ANSWER", 1, note);
+  const auto send = [&](const std::string& channel, std::uint8_t number) {
+    inner.publish(channel, Bytes{number});
+    inner.drain();
+  };
+
+  // A process that is stopped.
+  send("A", 1);
+  bus.stop();
+  send("A", 2);
+  send("B", 3);
+  send("A", 4);
+  CHECK(heard == "A1 ANSWER1 ");
+  bus.go_on();
+  inner.drain();
+  send("B", 5);
+  CHECK(heard == "A1 ANSWER1 A2 B3 A4 ANSWER2 ANSWER4 B5 ");
+
+  // One of its channels that is held back.
+  heard.clear();
+  bus.hold("ANSWER");
+  send("A", 6);
+  send("A", 7);
+  CHECK(heard == "A6 A7 ");
+  bus.go_on();
+  inner.drain();
+  CHECK(heard == "A6 A7 ANSWER6 ANSWER7 ");
 }
