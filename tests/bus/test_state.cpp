@@ -13,10 +13,9 @@
 #include <random>
 #include <thread>
 
-#include "common/bus/memory_bus.hpp"
 #include "common/bus/node_state.hpp"
 #include "common/bus/state_format.hpp"
-#include "tests/bus/toy_service.hpp"
+#include "tests/bus/toy_life.hpp"
 #include "tests/catch.hpp"
 #include "tests/scratch.hpp"
 
@@ -33,40 +32,6 @@ std::string read(const fs::path& file) {
 }
 void write(const fs::path& file, const std::string& bytes) {
   std::ofstream(file, std::ios::binary) << bytes;
-}
-
-/// One life of the toy: recovers, takes inputs [from, to), is killed (nothing is saved at the end).
-struct Life {
-  explicit Life(const fs::path& directory, const std::string& toml = "",
-                const Clock& clock = no_clock(),
-                StateStore::Saving saving = StateStore::Saving::kAtOnce)
-      : hosted(test::toy_service(), bus, clock, toml, "toy.toml"), store(directory, "toy", saving) {
-    bus.subscribe("RAW_POSE", 0, [this](const BusMessage& message) {
-      poses.push_back(*wire::decode_message<raw_pose_t>(message.bytes));
-    });
-    is_recovered = hosted.node().recover(store);
-    hosted.node().journal_to(&store);
-    hosted.node().connect();
-    bus.drain();
-  }
-  void run(int from, int to) {
-    for (int i = from; i < to; ++i) {
-      bus.publish("ODOMETRY", wire::encode_message(test::toy_input(i)));
-      bus.drain();
-    }
-  }
-  MemoryBus bus{MemoryBus::Queues::kUnlimited};
-  HostedService hosted;
-  StateStore store;
-  bool is_recovered = false;
-  std::vector<raw_pose_t> poses;
-};
-
-std::vector<raw_pose_t> uninterrupted(int to) {
-  const test::Scratch scratch("state");
-  Life life(scratch.path());
-  life.run(0, to);
-  return life.poses;
 }
 
 }  // namespace

@@ -10,7 +10,8 @@
 namespace understory::test {
 
 /// While one of these lives, all files of SQLite go through it. From the `first_failure`-th write,
-/// sync or truncation on (from 1) each of them fails, until set_whole(). One at a time.
+/// sync or truncation on (from 1) each of them fails, until set_whole(); with SQLITE_IOERR_READ
+/// reads count and fail as well. One at a time.
 class FailingDisk {
  public:
   FailingDisk() {
@@ -68,11 +69,13 @@ class FailingDisk {
 
   static int close(sqlite3_file* file) { return real(file)->pMethods->xClose(real(file)); }
   static int read(sqlite3_file* file, void* to, int size, sqlite3_int64 at) {
+    if (state().code == SQLITE_IOERR_READ && failure() != SQLITE_OK) return SQLITE_IOERR_READ;
     return real(file)->pMethods->xRead(real(file), to, size, at);
   }
   static int write(sqlite3_file* file, const void* from, int size, sqlite3_int64 at) {
     const int failed = failure();
-    return failed != SQLITE_OK ? failed : real(file)->pMethods->xWrite(real(file), from, size, at);
+    if (failed != SQLITE_OK) return failed == SQLITE_IOERR_READ ? SQLITE_IOERR_WRITE : failed;
+    return real(file)->pMethods->xWrite(real(file), from, size, at);
   }
   static int truncate(sqlite3_file* file, sqlite3_int64 size) {
     const int failed = failure();

@@ -39,7 +39,7 @@ struct Faulty {
 
 TEST_CASE_METHOD(Faulty, "a full disk stops the store only as long as it is full",
                  "[submap_store]") {
-  for (const int code : {SQLITE_FULL, SQLITE_IOERR_WRITE}) {
+  for (const int code : {SQLITE_FULL, SQLITE_IOERR_WRITE, SQLITE_IOERR_READ}) {
     for (long first = 1; first < 60; first += 3) {
       CAPTURE(code, first);
       std::filesystem::remove_all(directory.path() / "maps");
