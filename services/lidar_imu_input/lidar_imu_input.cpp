@@ -57,6 +57,13 @@ InputFault after_pause(Sensor sensor, double pause_s) {
                                                                : "time goes on")};
 }
 
+InputFault after_step_back(Sensor sensor, double back_s) {
+  return {InputFaultKind::kPaused, channel_of(sensor),
+          fmt::format("all clocks went back by {:.2f} s, as another recording does: everything "
+                      "begins anew",
+                      back_s)};
+}
+
 /// A sweep without times is not de-skewed, unless its azimuths give them.
 InputFault without_times(model::PointSweep& sweep, const DeskewParameters& parameters) {
   const std::string& direction = parameters.times_from_azimuth;
@@ -108,23 +115,41 @@ InputResults LidarImuInput::add(RawReading raw) {
   }
 
   // Is its stamp to be believed?
-  BelievedReadings believed = time_base_.take(std::move(raw), guard_, faults);
+  report(faults, out);
+  AfterStepBack after = step_back_.take(std::move(raw), guard_);
+  if (after.back_s) {
+    out.emplace_back(after_step_back(sensor, *after.back_s));
+    begin_anew();
+  }
+  for (RawReading& reading : after.readings) take(std::move(reading), out);
+  return out;
+}
+
+/// A reading on the time that never goes back.
+void LidarImuInput::take(RawReading reading, InputResults& out) {
+  const Sensor sensor = sensor_of(reading);
+  std::vector<InputFault> faults;
+  BelievedReadings believed = time_base_.take(std::move(reading), guard_, faults);
   report(faults, out);
   if (believed.pause_s) out.emplace_back(after_pause(sensor, *believed.pause_s));
-  if (believed.pause_s > kLongestPause_s) {
-    const GravityCheck gravity = gravity_;
-    const InputCounters counters = counters_;
-    *this = LidarImuInput(parameters_);
-    gravity_ = gravity;
-    counters_ = counters;
-  }
+  if (believed.pause_s > kLongestPause_s) begin_anew();
 
   // Use what nothing before it is missing of.
-  for (RawReading& reading : believed.readings) {
-    if (auto fault = order_.add(std::move(reading), guard_)) out.emplace_back(*std::move(fault));
+  for (RawReading& one : believed.readings) {
+    if (auto fault = order_.add(std::move(one), guard_)) out.emplace_back(*std::move(fault));
     use_ready(out, false);
   }
-  return out;
+}
+
+/// The vehicle may be anywhere, and its sensors at any temperature.
+void LidarImuInput::begin_anew() {
+  const StepBack step_back = step_back_;
+  const GravityCheck gravity = gravity_;
+  const InputCounters counters = counters_;
+  *this = LidarImuInput(parameters_);
+  step_back_ = step_back;
+  gravity_ = gravity;
+  counters_ = counters;
 }
 
 bool LidarImuInput::leaves_out(Sensor sensor) const {
@@ -246,6 +271,7 @@ InputResults LidarImuInput::add(const model::EkfPose& pose) {
 
 InputResults LidarImuInput::finish() {
   InputResults out;
+  for (RawReading& reading : step_back_.finish()) take(std::move(reading), out);
   for (RawReading& reading : time_base_.finish()) order_.add(std::move(reading), guard_);
   use_ready(out, true);
   settle(out, true);

@@ -28,6 +28,7 @@
 #include "services/lidar_imu_input/motion_estimator.hpp"
 #include "services/lidar_imu_input/output_pacing.hpp"
 #include "services/lidar_imu_input/raw_reading.hpp"
+#include "services/lidar_imu_input/step_back.hpp"
 #include "services/lidar_imu_input/sweep_queue.hpp"
 #include "services/lidar_imu_input/time_base.hpp"
 
@@ -103,10 +104,10 @@ class LidarImuInput {
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.time_base_, self.order_, self.guard_, self.gravity_, self.agreement_, self.laser_,
-      self.motion_, self.filter_motion_, self.counters_, self.queue_, self.increment_end_,
-      self.raw_poses_, self.calibration_, self.was_saturated_, self.left_out_imu_,
-      self.left_out_wheels_);
+    a(self.step_back_, self.time_base_, self.order_, self.guard_, self.gravity_, self.agreement_,
+      self.laser_, self.motion_, self.filter_motion_, self.counters_, self.queue_,
+      self.increment_end_, self.raw_poses_, self.calibration_, self.was_saturated_,
+      self.left_out_imu_, self.left_out_wheels_);
   }
 
  private:
@@ -115,6 +116,8 @@ class LidarImuInput {
   void use(const model::GnssFix& raw, InputResults& out);
   void use(model::PointSweep sweep, InputResults& out);
   void use(const model::PlanarScan& raw, InputResults& out);
+  void take(RawReading reading, InputResults& out);
+  void begin_anew();
   void begin_motion_anew();
   void note_left_out();
   void wait(WaitingSweep waiting, InputResults& out);
@@ -126,6 +129,7 @@ class LidarImuInput {
   void release_sweep(model::PointSweep raw, Sensor sensor, model::Utime stamp, InputResults& out);
 
   LidarImuInputParameters parameters_;
+  StepBack step_back_;
   TimeBase time_base_;
   ArrivalOrder order_;
   InputGuard guard_;

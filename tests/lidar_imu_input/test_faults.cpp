@@ -182,6 +182,56 @@ TEST_CASE("a clock that jumps ahead is followed", "[faults]") {
   CHECK(run.position_error_m < 2.0);
 }
 
+TEST_CASE("all clocks that go far back are another recording, one alone is a clock", "[faults]") {
+  const auto back_us = GENERATE(as<model::Utime>(), 12'000'000, 26'000'000, 3'600'000'000);
+  const bool all = GENERATE(true, false);
+  FaultyRun run;
+  const auto jump = [back_us](model::Utime& utime) {
+    if (test::seconds(utime) >= 27.0) utime -= back_us;
+    return true;
+  };
+  run.imu = [&](model::ImuSample& s) { return jump(s.utime); };
+  if (all) run.wheels = [&](model::WheelSample& s) { return jump(s.utime); };
+  // The first recording ends with a whole revolution.
+  if (all)
+    run.sweep = [&](model::PointSweep& s) {
+      return !within(s.utime, 26.85, 27.0) && jump(s.utime);
+    };
+  run.go();
+  CAPTURE(back_us, all, run.sweeps, run.largest_gap_us);
+  CHECK(run.sweeps >= 330);
+  CHECK(run.faults[InputFaultKind::kPaused] == (all ? 1 : 0));
+  CHECK(run.faults[InputFaultKind::kClockJump] == (all ? 0 : 2));
+  // Nobody knows the motion over the gap: who uses it must not take one drive for the other.
+  if (all) CHECK(run.largest_gap_us >= 2'000'000);
+  if (all) CHECK(run.largest_gap_us <= 2'300'000);
+}
+
+TEST_CASE("a sensor whose messages come late in one burst is no other recording", "[faults]") {
+  const test::Drive drive;
+  std::mt19937_64 random(5);
+  LidarImuInput input(test::parameters_for_drive());
+  std::vector<model::ImuSample> held;
+  int restarts = 0;
+  const auto take = [&](const InputResults& results) {
+    for (const InputResult& result : results) {
+      const auto* fault = std::get_if<InputFault>(&result);
+      if (fault != nullptr && fault->kind == InputFaultKind::kPaused) ++restarts;
+    }
+  };
+  for (model::Utime t = 0; t < 34'000'000; t += 10'000) {
+    const model::ImuSample sample = imu_at(drive, t, 100.0, {}, random);
+    if (within(t, 5.0, 30.0)) {
+      held.push_back(sample);
+    } else {
+      for (const model::ImuSample& late : std::exchange(held, {})) take(input.add(late));
+      take(input.add(sample));
+    }
+    if (t % 20'000 == 0) take(input.add(wheels_at(drive, t, {}, random)));
+  }
+  CHECK(restarts == 0);
+}
+
 TEST_CASE("values that are not finite are dropped and counted", "[faults]") {
   FaultyRun run;
   const double nan = std::numeric_limits<double>::quiet_NaN();
