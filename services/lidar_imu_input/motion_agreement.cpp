@@ -84,6 +84,7 @@ MotionAgreement::MotionAgreement(const LidarImuInputParameters& parameters)
 }
 
 void MotionAgreement::add(const model::WheelSample& raw) {
+  if (seconds_between(raw.utime, window_.from) > kEnd_s) return;  // Late: of another window.
   const double speed = axle_speed(car_, raw.speed_mps, raw.steering_rad);
   latest_wheels_utime_ = raw.utime;
   window_.speed += speed;

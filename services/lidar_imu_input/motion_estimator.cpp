@@ -111,7 +111,10 @@ void MotionEstimator::add_wheels(const model::WheelSample& sample) {
   if (attitude) scale = WheelScale{attitude->wheel_scale(), attitude->wheel_scale_sigma()};
   speeds_.add(sample.utime, speed, scale);
 
-  if (!attitude || !then || is_stationary()) return;
+  // What comes late in one burst has one error of the velocity then: counted once for each sample
+  // it would correct the velocity of now many times over.
+  const auto& latest = levelling_.latest();
+  if (!attitude || !then || is_stationary() || !speeds_.are_fresh(latest->utime)) return;
   constraints_.add_wheel_speed(speed, speeds_.latest(), *then,
                                levelling_.latest_level()->pitch_cosine, *attitude,
                                pose_.reckoning());
