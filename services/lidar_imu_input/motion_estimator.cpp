@@ -1,5 +1,6 @@
 #include "services/lidar_imu_input/motion_estimator.hpp"
 
+#include "services/lidar_imu_input/level_motion.hpp"
 #include "services/lidar_imu_input/stamps.hpp"
 
 namespace understory::lidar_imu_input {
@@ -149,8 +150,12 @@ void MotionEstimator::use_corrections(model::Utime now) {
     if (parameters_.gnss_aided) continue;
     const auto then = pose_.history().at(correction->utime);
     if (!then) continue;
-    pose_.reckoning().correct(*correction, then->level_velocity_mps, then->heading_rad);
-    corrections_.set_applied(now);
+    const Eigen::Matrix2d odom_R_then = planar_rotation(then->heading_rad);
+    const Eigen::Vector2d then_velocity_mps =
+        then->level_velocity_mps +
+        odom_R_then.transpose() * corrections_.change_since(correction->utime);
+    pose_.reckoning().correct(*correction, then_velocity_mps, then->heading_rad);
+    corrections_.set_applied(now, odom_R_then * (correction->velocity_mps - then_velocity_mps));
   }
 }
 

@@ -1,6 +1,7 @@
 // VELOCITY_CORRECTION messages until they take effect.
 #pragma once
 
+#include <Eigen/Core>
 #include <deque>
 #include <optional>
 
@@ -22,21 +23,37 @@ class VelocityCorrections {
   /// The next one that is due at `now`, in order of arrival; none where there is none.
   std::optional<model::VelocityCorrection> take_due(model::Utime now);
 
-  /// A correction was applied at `now`.
-  void set_applied(model::Utime now) { applied_utime_ = now; }
+  /// A correction was applied at `now`: from that sample on the velocity is another one by so much
+  /// [m/s, frame `odom`].
+  void set_applied(model::Utime now, const Eigen::Vector2d& odom_change_mps);
+  /// What corrections have changed since a time, which the velocity of then does not have. One
+  /// that comes late corrects what is left: of many in one burst each has the same error.
+  Eigen::Vector2d change_since(model::Utime utime) const;
   /// When one was last applied; 0 = never.
   model::Utime applied_utime() const { return applied_utime_; }
 
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.waiting_, self.applied_utime_);
+    a(self.waiting_, self.applied_utime_, self.changes_);
   }
 
  private:
+  struct Change {
+    model::Utime utime = 0;
+    Eigen::Vector2d odom_mps = Eigen::Vector2d::Zero();
+
+    /// For saving and loading.
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& self) {
+      a(self.utime, self.odom_mps);
+    }
+  };
+
   model::Utime delay_us_;
   std::deque<model::VelocityCorrection> waiting_;
   model::Utime applied_utime_ = 0;
+  std::deque<Change> changes_;  ///< As far back as velocities are known.
 };
 
 }  // namespace understory::lidar_imu_input

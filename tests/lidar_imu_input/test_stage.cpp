@@ -325,6 +325,47 @@ TEST_CASE("a velocity correction takes effect after its delay, and moves no posi
   CHECK(input.counters().corrections_late == 1);
 }
 
+TEST_CASE("corrections that come late in one burst correct the velocity once", "[stage]") {
+  Run run;
+  run.has_wheels = false;
+  run.parameters.constraint.nonholonomic = false;
+  std::mt19937_64 random(1);
+  LidarImuInput input(run.parameters);
+  const auto correct = [&](model::Utime utime) {
+    const double then = test::seconds(utime);
+    model::VelocityCorrection correction;
+    correction.utime = utime;
+    correction.velocity_mps << run.drive.speed(then) * std::cos(run.drive.pitch(then)), 0.0;
+    correction.bias << 0.004, 0.0, 0.0;
+    correction.covariance.setIdentity();
+    correction.covariance *= 1e-4;
+    input.add(correction);
+  };
+
+  // From 20 s on none comes; those of 3.5 s come at once, then each in time again.
+  constexpr model::Utime kFrom = 20'000'000, kTo = 23'500'000;
+  double worst_mps = 0.0;
+  std::optional<model::RawPose> last;
+  for (model::Utime t = 0; t < 30'000'000; t += 5'000) {
+    for (const model::RawPose& pose :
+         all_of<model::RawPose>(input.add(imu_at(run.drive, t, 200.0, mild_errors(), random)))) {
+      if (last && t > kTo + 200'000) {
+        const double dt_s = test::seconds(pose.utime - last->utime);
+        const double speed = (last->odom_T_vehicle.inverse() * pose.odom_T_vehicle).x() / dt_s;
+        worst_mps =
+            std::max(worst_mps, std::abs(speed - run.drive.speed(test::seconds(pose.utime))));
+      }
+      last = pose;
+    }
+    if (t < 200'000 || t % 100'000 != 0 || (t > kFrom && t < kTo)) continue;
+    if (t == kTo)
+      for (model::Utime held = kFrom; held < kTo - 100'000; held += 100'000) correct(held);
+    correct(t - 100'000);
+  }
+  CAPTURE(worst_mps);
+  CHECK(worst_mps < 0.1);
+}
+
 TEST_CASE("aided by GNSS the pose is a reference and drifts less", "[stage][gnss]") {
   Run run;
   run.has_wheels = false;
