@@ -63,7 +63,7 @@ struct Delay {
   double twice = 0.0;           ///< Part of the sensors' messages that come twice.
   bool has_wild_clock = false;  ///< The computer's clock jumps.
   Channels may_differ = {};
-  double near_m = 0.05;  ///< Most of the distance to the poses of the drive without delays.
+  double near_m = 0.1;  ///< Most of the distance to the poses of the drive without delays.
   double from_s = 0.0;
   double to_s = 0.0;
 };
