@@ -152,16 +152,15 @@ class Listener {
     });
     bus_.subscribe("SLAM_POSE", 0, [this](const bus::BusMessage& message) {
       const auto pose = wire::decode_message<model::SlamPose>(message.bytes);
-      if (!pose || (pose->status && !pose->is_localised())) return;
-      heard_.slam.push_back({pose->utime, now_s(), pose->map_T_vehicle(), pose->covariance,
-                             pose->map_id, pose->reset_counter, health_.is_ok()});
-      note_latency(pose->utime);
+      if (!pose) return;
+      if (const auto said = said_pose(*pose)) {
+        heard_.slam.push_back(heard_now(*said));
+        note_latency(pose->utime);
+      }
     });
     bus_.subscribe("EKF_POSE", 0, [this](const bus::BusMessage& message) {
       const auto pose = wire::decode_message<model::EkfPose>(message.bytes);
-      if (!pose) return;
-      heard_.filter.push_back({pose->utime, now_s(), pose->ekf_map_T_vehicle, pose->covariance, 0,
-                               pose->reset_counter, health_.is_ok()});
+      if (pose) heard_.filter.push_back(heard_now(said_pose(*pose)));
     });
   }
 
@@ -183,6 +182,11 @@ class Listener {
   }
 
  private:
+  SaidPose heard_now(SaidPose said) const {
+    said.received_s = now_s();
+    said.is_ok = health_.is_ok();
+    return said;
+  }
   void note_health() {
     const double at_s = now_s();
     for (std::size_t i = 0; i < faults_.size(); ++i) {

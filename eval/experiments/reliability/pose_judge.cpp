@@ -64,6 +64,22 @@ double next_from_s(std::span<const Fault> faults, std::size_t begun) {
 
 }  // namespace
 
+std::optional<SaidPose> said_pose(const model::SlamPose& pose) {
+  if (pose.status && !pose.is_localised()) return std::nullopt;
+  return SaidPose{pose.utime,           1e-6 * static_cast<double>(pose.utime),
+                  pose.map_T_vehicle(), pose.covariance,
+                  pose.map_id,          pose.reset_counter};
+}
+
+SaidPose said_pose(const model::EkfPose& pose) {
+  return {pose.utime,
+          1e-6 * static_cast<double>(pose.utime),
+          pose.ekf_map_T_vehicle,
+          pose.covariance,
+          0,
+          pose.reset_counter};
+}
+
 Broken broken(std::span<const SaidPose> poses) {
   Broken result;
   for (std::size_t i = 0; i < poses.size(); ++i) {

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "common/geometry/se2.hpp"
+#include "common/model/ekf_output.hpp"
+#include "common/model/slam_output.hpp"
 #include "eval/experiments/reliability/fault.hpp"
 #include "eval/metrics/victoria_park_score.hpp"
 #include "understory/health_t.hpp"
@@ -26,6 +28,11 @@ struct SaidPose {
   std::uint64_t resets = 0;
   bool is_ok = true;  ///< HEALTH of every process said OK.
 };
+
+/// A pose as it was published, received at its own time; none of a SLAM_POSE that says that it has
+/// no place.
+std::optional<SaidPose> said_pose(const model::SlamPose& pose);
+SaidPose said_pose(const model::EkfPose& pose);
 
 /// What became of one pose channel after one fault: from its end to the beginning of the next one.
 struct AfterFault {

@@ -16,6 +16,7 @@
 #include "eval/experiments/reliability/live_drive.hpp"
 #include "eval/experiments/reliability/processes.hpp"
 #include "eval/experiments/reliability/reliability.hpp"
+#include "eval/experiments/reliability/undelayed_drive.hpp"
 #include "eval/harness/results.hpp"
 #include "eval/tools/parallel.hpp"
 #include "eval/tools/quantile.hpp"
@@ -37,6 +38,7 @@ struct ReliabilityOptions {
   std::string only;
   int load = 0;
   int jobs = 1;
+  bool is_undelayed = false;
   LiveOptions live;
   std::string json;
 };
@@ -90,7 +92,9 @@ nlohmann::json drive_once(const ReliabilityOptions& options, std::uint64_t seed)
       fmt::format("drive {}: {:.0f} s, {} delays, load {}\n{:<34} | {:<35} | {:<35} | {}\n", seed,
                   tape.seconds(), faults.size(), options.load, "", "SLAM_POSE: in 3 sigma, step",
                   "EKF_POSE", "HEALTH");
-  const LiveDrive drive = play(tape, faults, options.live);
+  const LiveDrive drive = options.is_undelayed
+                              ? play_undelayed(tape, faults.size(), options.live.config_dir)
+                              : play(tape, faults, options.live);
   const std::vector<AfterFault> slam = judge(drive.slam, tape.truth, faults);
   const std::vector<AfterFault> filter = judge(drive.filter, tape.truth, faults);
   nlohmann::json rows = nlohmann::json::array();
@@ -167,6 +171,7 @@ void run(const ReliabilityOptions& options) {
                                  {"only", options.only},
                                  {"load", options.load},
                                  {"jobs", options.jobs},
+                                 {"undelayed", options.is_undelayed},
                                  {"supervised", options.live.supervised},
                                  {"config", options.live.config_dir.string()}};
   nlohmann::json drives = drives_in(options.json, config);
@@ -226,6 +231,9 @@ void add_reliability_experiment(CLI::App& eval) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
 
+  command.add_flag("--undelayed", options->is_undelayed,
+                   "No processes and no delays: the same drives through the stages in one "
+                   "process, judged at the same times");
   command.add_flag("--supervised", options->live.supervised,
                    "Under `understory launch`, which restarts what is stopped");
   command.add_option("--config", options->live.config_dir, "Configuration of the processes")
