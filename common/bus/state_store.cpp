@@ -178,6 +178,7 @@ StateStore::Recovered StateStore::open() {
   // Events that followed a lost snapshot mean nothing without it; only journal 0 starts at nothing.
   const std::uint64_t first = generation_;
   const std::uint64_t valid_bytes = snapshot_is_lost ? 0 : take_journals(recovered);
+  newest_ = generation_;
   keep_journals(first, generation_);
   if (auto refusal = open_journal(valid_bytes)) recovered.problems.push_back(*refusal);
   return recovered;
@@ -243,7 +244,7 @@ void StateStore::start_over() {
   lock();
   put_aside(path(".snapshot"));
   for (const std::uint64_t number : journals()) put_aside(journal_path(number));
-  generation_ = 0;
+  generation_ = newest_ = 0;
   open_journal(0);
 }
 
@@ -269,14 +270,16 @@ std::optional<wire::Refusal> StateStore::save(std::string state) {
 
   // What comes from here on follows the new snapshot, and the one before as well until the new one
   // is on the device. Behind a hole nothing follows the one before.
-  const std::uint64_t before = generation_;
-  if (is_behind_hole_) ::unlink(journal_path(before).c_str());
-  is_behind_hole_ = is_behind_hole_ || journal_broken_;
-  generation_ = before + (journal_broken_ ? 2 : 1);
+  const bool leaves_hole = journal_broken_;
+  const std::uint64_t before = std::exchange(generation_, newest_ + (leaves_hole ? 2 : 1));
+  newest_ = generation_;
   if (auto refusal = open_journal(0)) {
+    ::unlink(journal_path(generation_).c_str());
     generation_ = before;
     return refusal;
   }
+  if (is_behind_hole_) ::unlink(journal_path(before).c_str());
+  is_behind_hole_ = is_behind_hole_ || leaves_hole;
 
   if (saving_ == Saving::kAtOnce) return ended(write_snapshot(generation_, state));
   writing_ = std::async(std::launch::async, [this, number = generation_, state = std::move(state)] {

@@ -99,6 +99,7 @@ class StateStore {
   std::string name_;
   Saving saving_;
   std::uint64_t generation_ = 0;  ///< Of the journal that is written.
+  std::uint64_t newest_ = 0;      ///< Of those that were begun, also in vain.
   std::future<Kept> writing_;     ///< Valid while a snapshot is written beside.
   int journal_ = -1;
   int lock_ = -1;
