@@ -14,8 +14,8 @@ tinyGrid3D.g2o smallGrid3D.g2o sphere2500.g2o torus3D.g2o rrr_NewCollege.g2o""".
 PARTITION = "--seed 1 --jobs 2 --front-end ideal,lidar --recordings OUT/partition-drives"
 TOWN = f"{PARTITION} --runs 20 --lidar-runs 20 --routes urban"
 COUNTRY = f"{PARTITION} --runs 20 --lidar-runs 20 --routes urban-countryside"
-# Drives at their own speed, four minutes each: of the long campaign 24 (`deploy/campaign --long`).
-RELIABILITY = "reliability --drives 2 --first-seed 1001 --length-m 1000 --config deploy/config/lidar"
+# Drives at their own speed, four minutes each (`deploy/campaign --long`).
+RELIABILITY = "reliability --first-seed 1001 --length-m 1000 --config deploy/config/lidar"
 SUBMAP_SIZES = "--size-m 20,100,200,300,400,500"
 
 
@@ -141,8 +141,9 @@ EXPERIMENTS = (
     _eval("closures", "closures --runs 100 --plantations 4 --seed 1 --jobs 2", 8),
     _eval("gaps", "gaps --seeds 5 --first-seed 801 --jobs 2", 15),
     _eval("mountings", "mountings --drives 9 --faults 23 --sound-drives 40 --first-seed 1001 --jobs 2", 4),
-    _eval("reliability-load-0", f"{RELIABILITY} --load 0", 10),
-    _eval("reliability-load-8", f"{RELIABILITY} --load 8", 10),
+    _eval("reliability-load-0", f"{RELIABILITY} --drives 30 --jobs 4 --load 0", 32),
+    _eval("reliability-undelayed", f"{RELIABILITY} --drives 30 --jobs 2 --undelayed", 8),
+    _eval("reliability-load-8", f"{RELIABILITY} --drives 8 --jobs 4 --load 8", 9),
     _eval("misstated", "misstated --runs 10 --seed 2001", 4),
     _eval("victoria-park", "victoria-park --data DATA", 1, ("victoria_park_raw", "victoria_park_landmark")),
     _eval("frontend-chain", "frontend --only chain --config deploy/config/lidar --jobs 2 --data DATA", 25,

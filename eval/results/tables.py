@@ -94,6 +94,7 @@ SECTIONS = (
     ("laps-held", "Localisation only: what must not change", None, render.laps),
     ("health", "What HEALTH says of wrong poses", None, render.health),
     ("reliability-load-0", "Real processes while messages and processes are late", None, render_reliability.reliability),
+    ("reliability-undelayed", "The same drives without delays", None, render_reliability.undelayed),
     ("reliability-load-8", "The same on a busy computer", None, render_reliability.reliability),
     ("gaps", "Processes that hang, sensors that are silent", None, render_gaps.gaps),
     ("mountings", "Wrong mountings, units and signs of sensors", None, render_mountings.mountings),
