@@ -164,16 +164,16 @@ std::vector<std::uint64_t> seeds_left(const ReliabilityOptions& options,
 }
 
 void run(const ReliabilityOptions& options) {
-  const nlohmann::json config = {{"delays", options.faults},
-                                 {"longest_s", options.longest_s},
-                                 {"apart_s", options.apart_s},
-                                 {"length_m", options.length_m},
-                                 {"only", options.only},
-                                 {"load", options.load},
-                                 {"jobs", options.jobs},
-                                 {"undelayed", options.is_undelayed},
-                                 {"supervised", options.live.supervised},
-                                 {"config", options.live.config_dir.string()}};
+  nlohmann::json config = {{"delays", options.faults},
+                           {"longest_s", options.longest_s},
+                           {"apart_s", options.apart_s},
+                           {"length_m", options.length_m},
+                           {"only", options.only},
+                           {"load", options.load},
+                           {"jobs", options.jobs},
+                           {"supervised", options.live.supervised},
+                           {"config", options.live.config_dir.string()}};
+  if (options.is_undelayed) config["undelayed"] = true;
   nlohmann::json drives = drives_in(options.json, config);
   const std::vector<std::uint64_t> seeds = seeds_left(options, drives);
   Processes load;
