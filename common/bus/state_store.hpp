@@ -31,8 +31,8 @@ struct JournalEvent {
 /// G, G + 1, ... together are what came since snapshot G. A number that is left out is a hole.
 class StateStore {
  public:
-  /// Who waits for the device while a snapshot is flushed: the caller of save(), or a thread beside
-  /// it. A slow device takes seconds.
+  /// Where a snapshot is written and flushed: in save(), or in a thread beside it. A slow device
+  /// takes seconds.
   enum class Saving : std::uint8_t { kAtOnce, kBeside };
   /// How a snapshot ended: none = it is kept.
   using Kept = std::optional<wire::Refusal>;

@@ -92,9 +92,11 @@ nlohmann::json drive_once(const ReliabilityOptions& options, std::uint64_t seed)
       fmt::format("drive {}: {:.0f} s, {} delays, load {}\n{:<34} | {:<35} | {:<35} | {}\n", seed,
                   tape.seconds(), faults.size(), options.load, "", "SLAM_POSE: in 3 sigma, step",
                   "EKF_POSE", "HEALTH");
+
   const LiveDrive drive = options.is_undelayed
                               ? play_undelayed(tape, faults.size(), options.live.config_dir)
                               : play(tape, faults, options.live);
+
   const std::vector<AfterFault> slam = judge(drive.slam, tape.truth, faults);
   const std::vector<AfterFault> filter = judge(drive.filter, tape.truth, faults);
   nlohmann::json rows = nlohmann::json::array();
@@ -107,6 +109,7 @@ nlohmann::json drive_once(const ReliabilityOptions& options, std::uint64_t seed)
                     {"ekf", to_json(filter[i])},
                     {"not_ok", drive.not_ok[i]}});
   }
+
   const double p50_ms = tools::quantile(drive.latency_ms, 0.5);
   const double p99_ms = tools::quantile(drive.latency_ms, 0.99);
   fmt::print(
