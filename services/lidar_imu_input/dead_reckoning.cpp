@@ -64,12 +64,24 @@ void DeadReckoning::propagate(const LevelSample& a, const LevelSample& b) {
   velocity_ = back * (back * velocity_ + force * dt);
 }
 
+void DeadReckoning::propagate_velocity(const LevelSample& a, const LevelSample& b) {
+  const geometry::SE2 pose = pose_;
+  const Eigen::Matrix3d covariance = pose_covariance();
+  propagate(a, b);
+  pose_ = pose;
+  set_pose_covariance(covariance);
+}
+
+void DeadReckoning::set_pose_covariance(const Eigen::Matrix3d& covariance) {
+  covariance_.topRightCorner<3, 5>().setZero();
+  covariance_.bottomLeftCorner<5, 3>().setZero();
+  covariance_.topLeftCorner<3, 3>() = covariance;
+}
+
 void DeadReckoning::bridge(const geometry::SE2WithCovariance& motion) {
   const geometry::SE2WithCovariance moved = compound({pose_, pose_covariance()}, motion);
   pose_ = moved.mean;
-  covariance_.topRightCorner<3, 5>().setZero();
-  covariance_.bottomLeftCorner<5, 3>().setZero();
-  covariance_.topLeftCorner<3, 3>() = moved.covariance;
+  set_pose_covariance(moved.covariance);
   covariance_.block<2, 2>(3, 3).diagonal().array() += square(kBridgeSpeed);
 }
 

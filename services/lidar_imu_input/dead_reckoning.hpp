@@ -23,6 +23,8 @@ class DeadReckoning {
 
   /// From sample a to sample b, trapezoidal rule.
   void propagate(const LevelSample& a, const LevelSample& b);
+  /// The same where the pose has been moved over this time already: velocity and biases alone.
+  void propagate_velocity(const LevelSample& a, const LevelSample& b);
   /// Motion over a time that no sample covers, in frame `vehicle_level`.
   void bridge(const geometry::SE2WithCovariance& motion);
   /// Updates with a velocity component: `residual_mps` = measured - predicted value of
@@ -59,6 +61,8 @@ class DeadReckoning {
  private:
   using Row = Eigen::Matrix<double, 1, 8>;
   void update(const Row& row, double residual, double variance, bool moves_heading);
+  /// Of the pose, which then has nothing in common with velocity and biases.
+  void set_pose_covariance(const Eigen::Matrix3d& covariance);
 
   ImuParameters imu_;
   geometry::SE2 pose_;  ///< odom_T_vehicle.

@@ -4,6 +4,12 @@
 #include "services/lidar_imu_input/stamps.hpp"
 
 namespace understory::lidar_imu_input {
+namespace {
+
+/// Samples of an IMU that come later than this are not waited for.
+constexpr double kLatestImu_s = 12.0;
+
+}  // namespace
 
 MotionEstimator::MotionEstimator(const LidarImuInputParameters& parameters)
     : parameters_(parameters),
@@ -39,6 +45,7 @@ void MotionEstimator::add_imu(const model::ImuSample& sample, bool is_saturated)
 
   use_corrections(sample.utime);
   pose_.remember(sample, *levelling_.attitude());
+  correct_by_wheels_reached(sample);
 }
 
 void MotionEstimator::start(const model::ImuSample& sample) {
@@ -74,6 +81,8 @@ void MotionEstimator::propagate(const model::ImuSample& sample, bool is_saturate
 void MotionEstimator::bridge_gap(const model::ImuSample& sample) {
   levelling_.bridge(seconds_between(levelling_.latest()->utime, sample.utime));
   stationary_.begin_at(sample.utime);
+  // What the wheels measured in the gap is of another velocity than that of now.
+  while (!ahead_.empty() && ahead_.front().utime < sample.utime) ahead_.pop_front();
 
   const double last_rate = levelling_.latest_level()->yaw_rate_rad_s;
   pose_.bridge_gap(sample.utime, last_rate - stationary_.bias().bias_rad_s);
@@ -100,25 +109,53 @@ void MotionEstimator::add_wheels(const model::WheelSample& sample) {
   increments_.add(sample);
   stationary_.add_wheel_speed(sample.utime, sample.speed_mps);
 
-  // Speed of the axle's middle: a wheel left of it is slower in a left turn.
-  const CarGeometry& car = parameters_.wheels.car;
-  const auto then = pose_.history().at(sample.utime);
-  const double speed = then ? sample.speed_mps + then->rate_rad_s.z() * car.encoder_left_m
-                            : axle_speed(car, sample.speed_mps, sample.steering_rad);
-
   // The scale that IMU and wheels together show is taken out.
-  std::optional<AttitudeFilter>& attitude = levelling_.attitude();
-  std::optional<WheelScale> scale;
-  if (attitude) scale = WheelScale{attitude->wheel_scale(), attitude->wheel_scale_sigma()};
-  speeds_.add(sample.utime, speed, scale);
+  const auto then = pose_.history().at(sample.utime);
+  const double speed_mps = middle_speed(sample, then ? &*then : nullptr);
+  speeds_.add(speeds_.corrected(sample.utime, speed_mps, wheel_scale()));
 
+  const auto& latest = levelling_.latest();
+  if (!latest) return;
+  if (seconds_between(latest->utime, sample.utime) > parameters_.imu.max_gap_s) {
+    ahead_.push_back(sample);
+    if (seconds_between(ahead_.front().utime, sample.utime) > kLatestImu_s) ahead_.pop_front();
+    return;
+  }
   // What comes late in one burst has one error of the velocity then: counted once for each sample
   // it would correct the velocity of now many times over.
-  const auto& latest = levelling_.latest();
-  if (!attitude || !then || is_stationary() || !speeds_.are_fresh(latest->utime)) return;
-  constraints_.add_wheel_speed(speed, speeds_.latest(), *then,
-                               levelling_.latest_level()->pitch_cosine, *attitude,
-                               pose_.reckoning());
+  if (then && speeds_.are_fresh(latest->utime)) correct_by_wheels(sample, *then);
+}
+
+/// Speed of the axle's middle [m/s]: a wheel left of it is slower in a left turn.
+double MotionEstimator::middle_speed(const model::WheelSample& sample,
+                                     const MotionState* then) const {
+  const CarGeometry& car = parameters_.wheels.car;
+  if (then == nullptr) return axle_speed(car, sample.speed_mps, sample.steering_rad);
+  return sample.speed_mps + then->rate_rad_s.z() * car.encoder_left_m;
+}
+
+/// The scale that IMU and wheels together show; none without an IMU.
+std::optional<WheelScale> MotionEstimator::wheel_scale() const {
+  const std::optional<AttitudeFilter>& attitude = levelling_.attitude();
+  if (!attitude) return std::nullopt;
+  return WheelScale{attitude->wheel_scale(), attitude->wheel_scale_sigma()};
+}
+
+/// `then`: the motion at the sample, as attitude and dead reckoning have it.
+void MotionEstimator::correct_by_wheels(const model::WheelSample& sample, const MotionState& then) {
+  if (is_stationary()) return;
+  const double speed_mps = middle_speed(sample, &then);
+  constraints_.add_wheel_speed(speed_mps, speeds_.corrected(sample.utime, speed_mps, wheel_scale()),
+                               then, levelling_.latest_level()->pitch_cosine,
+                               *levelling_.attitude(), pose_.reckoning());
+}
+
+/// Wheel samples whose time an IMU sample has reached that came late.
+void MotionEstimator::correct_by_wheels_reached(const model::ImuSample& sample) {
+  while (!ahead_.empty() && ahead_.front().utime <= sample.utime) {
+    correct_by_wheels(ahead_.front(), pose_.state_at(sample, *levelling_.attitude()));
+    ahead_.pop_front();
+  }
 }
 
 void MotionEstimator::add_gnss(const model::GnssFix& fix) {

@@ -2,6 +2,7 @@
 // that the filter may correct.
 #pragma once
 
+#include <deque>
 #include <optional>
 
 #include "common/model/ekf_output.hpp"
@@ -34,7 +35,8 @@ class MotionEstimator {
   /// Takes a sample that to_vehicle() gave. `is_saturated`: the samples before it were left out
   /// since a sensor was at the end of its range.
   void add_imu(const model::ImuSample& vehicle_sample, bool is_saturated);
-  /// Takes speed and steering.
+  /// Takes speed and steering. Attitude and velocity are those of the latest IMU sample: what the
+  /// wheels measure of a later time corrects them when the IMU gets there.
   void add_wheels(const model::WheelSample& sample);
   /// Takes a fix: ignored unless `gnss_aided`.
   void add_gnss(const model::GnssFix& fix);
@@ -67,13 +69,17 @@ class MotionEstimator {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.lever_, self.levelling_, self.stationary_, self.pose_, self.speeds_, self.constraints_,
-      self.reference_, self.corrections_, self.increments_, self.rest_);
+      self.reference_, self.corrections_, self.increments_, self.rest_, self.ahead_);
   }
 
  private:
   void start(const model::ImuSample& sample);
   void propagate(const model::ImuSample& sample, bool is_saturated, double seconds);
   void bridge_gap(const model::ImuSample& sample);
+  std::optional<WheelScale> wheel_scale() const;
+  double middle_speed(const model::WheelSample& sample, const MotionState* then) const;
+  void correct_by_wheels(const model::WheelSample& sample, const MotionState& then);
+  void correct_by_wheels_reached(const model::ImuSample& sample);
   void use_standstill(const model::ImuSample& sample, double seconds);
   void use_corrections(model::Utime now);
 
@@ -88,6 +94,7 @@ class MotionEstimator {
   VelocityCorrections corrections_;
   MotionIncrements increments_;
   RestWatch rest_;
+  std::deque<model::WheelSample> ahead_;  ///< Of later than the IMU, in order of time.
 };
 
 }  // namespace understory::lidar_imu_input

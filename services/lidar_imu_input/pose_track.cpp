@@ -9,6 +9,11 @@ namespace understory::lidar_imu_input {
 
 void PoseTrack::propagate(const LevelSample& from, const LevelSample& to, double climb_mps,
                           double seconds) {
+  if (utime_ && to.utime <= *utime_) {
+    // The wheels have moved the pose over this time; the sample comes late.
+    reckoning_.propagate_velocity(from, to);
+    return;
+  }
   reckoning_.propagate(from, to);
   height_m_ += climb_mps * seconds;
 }
@@ -60,7 +65,11 @@ void PoseTrack::follow_wheels(const model::Odometry& odometry) {
 
 void PoseTrack::remember(const model::ImuSample& sample, const AttitudeFilter& attitude) {
   if (!history_.empty() && history_.newest().utime >= sample.utime) return;
+  history_.add(state_at(sample, attitude));
+}
 
+MotionState PoseTrack::state_at(const model::ImuSample& sample,
+                                const AttitudeFilter& attitude) const {
   MotionState state;
   state.utime = sample.utime;
   state.heading_rad = reckoning_.pose().theta();
@@ -72,7 +81,7 @@ void PoseTrack::remember(const model::ImuSample& sample, const AttitudeFilter& a
   state.level_velocity_mps = reckoning_.velocity();
   state.rate_rad_s = sample.angular_rate_rad_s - attitude.gyro_bias();
   state.tilt_covariance = attitude.tilt_covariance();
-  history_.add(state);
+  return state;
 }
 
 model::RawPose PoseTrack::raw_pose(bool is_reference) const {

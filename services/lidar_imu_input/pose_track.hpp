@@ -26,6 +26,8 @@ class PoseTrack {
   void follow_wheels(const model::Odometry& odometry);
   /// The IMU has moved the pose up to `utime`.
   void reach(model::Utime utime);
+  /// The motion at the latest IMU sample (frame vehicle).
+  MotionState state_at(const model::ImuSample& sample, const AttitudeFilter& attitude) const;
   /// Puts the motion at an IMU sample (frame vehicle) into the history.
   void remember(const model::ImuSample& sample, const AttitudeFilter& attitude);
 

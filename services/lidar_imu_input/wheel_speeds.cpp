@@ -12,16 +12,17 @@ constexpr double kLeastScaleSigma = 0.003;
 
 }  // namespace
 
-void WheelSpeeds::add(model::Utime utime, double measured_mps,
-                      const std::optional<WheelScale>& scale) {
+SpeedSample WheelSpeeds::corrected(model::Utime utime, double measured_mps,
+                                   const std::optional<WheelScale>& scale) const {
   const double known = wheels_.noise.speed_scale_sigma;
-  if (scale) {
-    const double sigma = std::max(kLeastScaleSigma, 1.5 * scale->sigma);
-    speeds_.push_back({utime, measured_mps / scale->measured_over_true, std::min(known, sigma)});
-  } else {
-    speeds_.push_back({utime, measured_mps, known});
-  }
-  while (seconds_between(speeds_.front().utime, utime) > kSpeedsKept_s) speeds_.pop_front();
+  if (!scale) return {utime, measured_mps, known};
+  const double sigma = std::max(kLeastScaleSigma, 1.5 * scale->sigma);
+  return {utime, measured_mps / scale->measured_over_true, std::min(known, sigma)};
+}
+
+void WheelSpeeds::add(const SpeedSample& speed) {
+  speeds_.push_back(speed);
+  while (seconds_between(speeds_.front().utime, speed.utime) > kSpeedsKept_s) speeds_.pop_front();
 }
 
 bool WheelSpeeds::are_fresh(model::Utime now) const {

@@ -34,9 +34,12 @@ class WheelSpeeds {
   /// `wheels`: noise, and how long a sample holds.
   explicit WheelSpeeds(const WheelOdometryParameters& wheels) : wheels_(wheels) {}
 
-  /// Takes the axle's speed as the wheels measured it [m/s], corrected by the scale where that is
-  /// known. The result is never less certain than the wheels' own noise.
-  void add(model::Utime utime, double measured_mps, const std::optional<WheelScale>& scale);
+  /// The axle's speed as the wheels measured it [m/s], corrected by the scale where that is known.
+  /// The result is never less certain than the wheels' own noise.
+  SpeedSample corrected(model::Utime utime, double measured_mps,
+                        const std::optional<WheelScale>& scale) const;
+  /// Takes a corrected speed. Precondition: not before the latest one.
+  void add(const SpeedSample& speed);
 
   /// Whether a sample came so lately that it still holds at `now`.
   bool are_fresh(model::Utime now) const;

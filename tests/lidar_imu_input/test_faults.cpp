@@ -1,6 +1,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <random>
 
 #include "services/lidar_imu_input/lidar_imu_input.hpp"
@@ -230,6 +231,47 @@ TEST_CASE("a sensor whose messages come late in one burst is no other recording"
     if (t % 20'000 == 0) take(input.add(wheels_at(drive, t, {}, random)));
   }
   CHECK(restarts == 0);
+}
+
+TEST_CASE("an IMU that comes late in one burst counts once, with the wheels of its time",
+          "[faults]") {
+  const bool is_held = GENERATE(false, true);
+  const test::Drive drive;
+  const test::Track track(drive, 36.0);
+  std::mt19937_64 random(6);
+  LidarImuInput input(test::parameters_for_drive());
+  std::vector<model::ImuSample> held;
+  std::optional<model::RawPose> pose;
+  double way_m = 0.0;
+  double true_way_m = 0.0;
+  const auto take = [&](const InputResults& results) {
+    for (const InputResult& result : results) {
+      const auto* one = std::get_if<model::RawPose>(&result);
+      if (one == nullptr) continue;
+      if (pose) {
+        const auto moved_m = [](const geometry::SE2& a, const geometry::SE2& b) {
+          return (b.translation() - a.translation()).norm();
+        };
+        way_m += moved_m(pose->odom_T_vehicle, one->odom_T_vehicle);
+        true_way_m += moved_m(track.planar(test::seconds(pose->utime)),
+                              track.planar(test::seconds(one->utime)));
+      }
+      pose = *one;
+    }
+  };
+  for (model::Utime t = 0; t < 35'000'000; t += 10'000) {
+    const model::ImuSample sample = imu_at(drive, t, 100.0, {}, random);
+    if (is_held && within(t, 26.0, 32.0)) {
+      held.push_back(sample);
+    } else {
+      for (const model::ImuSample& late : std::exchange(held, {})) take(input.add(late));
+      take(input.add(sample));
+    }
+    if (t % 20'000 == 0) take(input.add(wheels_at(drive, t, {}, random)));
+  }
+  CHECK(true_way_m > 30.0);
+  CHECK(std::abs(way_m - true_way_m) < 0.02 * true_way_m);
+  CHECK(std::abs(input.motion().attitude()->wheel_scale() - 1.0) < 0.01);
 }
 
 TEST_CASE("values that are not finite are dropped and counted", "[faults]") {

@@ -10,13 +10,14 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <span>
 
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/reliability/live_drive.hpp"
+#include "eval/experiments/reliability/memory_drive.hpp"
 #include "eval/experiments/reliability/processes.hpp"
 #include "eval/experiments/reliability/reliability.hpp"
-#include "eval/experiments/reliability/undelayed_drive.hpp"
 #include "eval/harness/results.hpp"
 #include "eval/tools/parallel.hpp"
 #include "eval/tools/quantile.hpp"
@@ -39,6 +40,7 @@ struct ReliabilityOptions {
   int load = 0;
   int jobs = 1;
   bool is_undelayed = false;
+  bool is_in_memory = false;
   LiveOptions live;
   std::string json;
 };
@@ -83,6 +85,15 @@ std::string line_of(const Fault& fault, const AfterFault& slam, const AfterFault
                      of(slam), of(filter), not_ok);
 }
 
+LiveDrive played(const ReliabilityOptions& options, const SensorTape& tape,
+                 std::span<const Fault> faults) {
+  if (options.is_in_memory) return play_in_memory(tape, faults, options.live.config_dir);
+  if (!options.is_undelayed) return play(tape, faults, options.live);
+  LiveDrive drive = play_in_memory(tape, {}, options.live.config_dir);
+  drive.not_ok.resize(faults.size());
+  return drive;
+}
+
 /// One drive: its faults as rows, and what holds for the whole of it.
 nlohmann::json drive_once(const ReliabilityOptions& options, std::uint64_t seed) {
   const SensorTape tape = record_tape(options.length_m, seed);
@@ -93,9 +104,7 @@ nlohmann::json drive_once(const ReliabilityOptions& options, std::uint64_t seed)
                   tape.seconds(), faults.size(), options.load, "", "SLAM_POSE: in 3 sigma, step",
                   "EKF_POSE", "HEALTH");
 
-  const LiveDrive drive = options.is_undelayed
-                              ? play_undelayed(tape, faults.size(), options.live.config_dir)
-                              : play(tape, faults, options.live);
+  const LiveDrive drive = played(options, tape, faults);
 
   const std::vector<AfterFault> slam = judge(drive.slam, tape.truth, faults);
   const std::vector<AfterFault> filter = judge(drive.filter, tape.truth, faults);
@@ -177,6 +186,7 @@ void run(const ReliabilityOptions& options) {
                            {"supervised", options.live.supervised},
                            {"config", options.live.config_dir.string()}};
   if (options.is_undelayed) config["undelayed"] = true;
+  if (options.is_in_memory) config["in_memory"] = true;
   nlohmann::json drives = drives_in(options.json, config);
   const std::vector<std::uint64_t> seeds = seeds_left(options, drives);
   Processes load;
@@ -234,9 +244,15 @@ void add_reliability_experiment(CLI::App& eval) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
 
-  command.add_flag("--undelayed", options->is_undelayed,
-                   "No processes and no delays: the same drives through the stages in one "
-                   "process, judged at the same times");
+  CLI::Option* undelayed =
+      command.add_flag("--undelayed", options->is_undelayed,
+                       "No processes and no delays: the same drives through the stages in one "
+                       "process, judged at the same times");
+  command
+      .add_flag("--in-memory", options->is_in_memory,
+                "No processes: the stages in one process get held messages late, and nothing "
+                "stops; the same bytes each time")
+      ->excludes(undelayed);
   command.add_flag("--supervised", options->live.supervised,
                    "Under `understory launch`, which restarts what is stopped");
   command.add_option("--config", options->live.config_dir, "Configuration of the processes")
