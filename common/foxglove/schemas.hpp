@@ -20,7 +20,7 @@ std::string object_schema(std::string_view title, const std::vector<Property>& p
 /// {sec, nsec} since the epoch.
 std::string time_schema();
 
-/// By name (foxglove.Log): those of @foxglove/schemas 2.1.0, without their descriptions. A test
+/// By name (foxglove.Log): those of `@foxglove/schemas` 2.1.0, without their descriptions. A test
 /// compares them.
 std::map<std::string_view, std::string> well_known_schemas();
 

@@ -50,7 +50,7 @@ enum class Delivery : std::uint8_t {
 struct Topic {
   TopicId id = TopicId::kPose;
   std::string_view name;         ///< For example /pose.
-  std::string_view schema_name;  ///< foxglove.NAME as in @foxglove/schemas, or understory.NAME.
+  std::string_view schema_name;  ///< foxglove.NAME as in `@foxglove/schemas`, or understory.NAME.
   Delivery delivery = Delivery::kLatest;
   bool has_state =
       false;  ///< A client that comes later needs the latest one (Converter::state_of).

@@ -6,7 +6,7 @@
 
 namespace understory::terminal {
 
-/// `text` with every byte that could steer a terminal, or is no UTF-8, written as \xNN: control
+/// `text` with every byte that could steer a terminal, or is no UTF-8, written as `\xNN`: control
 /// characters (also those beyond ASCII), marks that turn the direction of writing, and damaged or
 /// overlong sequences. Everything else stays as it is; the result is one line of valid UTF-8.
 std::string printable(std::string_view text);

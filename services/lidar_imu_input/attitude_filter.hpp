@@ -62,7 +62,7 @@ class AttitudeFilter {
   void bridge(double seconds);
 
   /// Updates with a velocity component: `residual_mps` = measured - predicted value of
-  /// `direction . (u + w x at)`; `direction` unit, `at` [m].
+  /// direction . (u + w x at); `direction` unit, `at` [m].
   void add_velocity(const Eigen::Vector3d& direction, const Eigen::Vector3d& at,
                     double residual_mps, double sigma_mps);
   /// Updates with the speed along `forward` at `at` [m]: predicted without the wheels' scale, and

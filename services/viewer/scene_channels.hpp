@@ -17,7 +17,7 @@ struct ChannelTraits {
   bool is_on_message_time = true;  ///< Its stamps are those of the sensors.
 };
 
-/// Calls visit.operator()<T>(channel, traits, take) for each channel, with
+/// Calls `visit.operator()<T>(channel, traits, take)` for each channel, with
 /// take(scene, value, wall_us) for a value T of common/model, or a wire type.
 template <class Visit>
 void for_each_channel(Visit&& visit) {
