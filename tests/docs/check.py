@@ -1,9 +1,9 @@
-"""Runs the sessions of a guide and compares their output with what the guide shows.
+"""Runs the sessions of guides and compares their output with what the guides show.
 
-    check.py --understory COMMAND --inputs DOC_INPUTS [--update] GUIDE.md
+    check.py --understory COMMAND --inputs DOC_INPUTS [--update] GUIDE.md...
 
-A session is a block between ``` whose first line begins with "$ ". Its commands run in one new folder, in which DOC_INPUTS has made the
-recordings; "$ cat FILE" makes the file. Numbers may differ by 2 % or by one in the last digit shown: other processors round otherwise. A
+A session is a block between ``` whose first line begins with "$ ". The commands of all guides run in one new folder, in the order of the guides: DOC_INPUTS
+has made the recordings there, `deploy` is that of the tree, and "$ cat FILE" makes the file. Numbers may differ by 2 % or by one in the last digit shown: other processors round otherwise. A
 block after a line "<!-- not run: REASON -->" is left out and counted. --update writes into the guide what the commands print.
 """
 import argparse
@@ -59,49 +59,52 @@ def run(command, folder, environment):
     return done.stdout.decode().splitlines()
 
 
-def check(guide, understory, inputs, update):
+def check(guide, folder, environment, update):
+    """Whether all sessions of one guide print what it shows."""
     lines = guide.read_text().splitlines()
     blocks = list(sessions(lines))
     left_out = [reason for _, _, reason in blocks if reason]
     wrong, ran, changed = 0, 0, {}
-    with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([pathlib.Path(inputs).resolve(), folder], check=True)
-        environment = dict(os.environ, PATH=f"{pathlib.Path(understory).resolve().parent}:{os.environ['PATH']}", HOME=folder)
-        for begin, end, reason in blocks:
-            if reason:
+    for begin, end, reason in blocks:
+        if reason:
+            continue
+        new = []
+        for command, shown in commands(lines[begin:end]):
+            if command.startswith("cat "):
+                (pathlib.Path(folder) / command[4:].strip()).write_text("\n".join(shown) + "\n")
+            said = run(command, folder, environment)
+            ran += 1
+            new += ["$ " + command, *said]
+            if len(said) == len(shown) and all(map(same, shown, said)):
                 continue
-            new = []
-            for command, shown in commands(lines[begin:end]):
-                if command.startswith("cat "):
-                    (pathlib.Path(folder) / command[4:].strip()).write_text("\n".join(shown) + "\n")
-                said = run(command, folder, environment)
-                ran += 1
-                new += ["$ " + command, *said]
-                if len(said) == len(shown) and all(map(same, shown, said)):
-                    continue
-                wrong += 1
-                print(f"{guide}:{begin + 1}: $ {command}", *("  guide:   " + line for line in shown), *("  command: " + line for line in said), sep="\n")
-            changed[begin] = (end, new)
+            wrong += 1
+            print(f"{guide}:{begin + 1}: $ {command}", *("  guide:   " + line for line in shown), *("  command: " + line for line in said), sep="\n")
+        changed[begin] = (end, new)
     print(f"{guide}: {ran} commands run, {wrong} print otherwise than the guide shows, {len(left_out)} sessions not run")
     if update:
         for begin in sorted(changed, reverse=True):
             end, new = changed[begin]
             lines[begin:end] = new
         guide.write_text("\n".join(lines) + "\n")
-        return 0
+        return True
     if ran == 0:
         print(f"{guide}: no session in it")
-    return 1 if wrong or ran == 0 else 0
+    return wrong == 0 and ran > 0
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("guide", type=pathlib.Path)
+    parser.add_argument("guides", type=pathlib.Path, nargs="+")
     parser.add_argument("--understory", required=True)
     parser.add_argument("--inputs", required=True)
     parser.add_argument("--update", action="store_true")
     options = parser.parse_args()
-    return check(options.guide, options.understory, options.inputs, options.update)
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([pathlib.Path(options.inputs).resolve(), folder], check=True)
+        (pathlib.Path(folder) / "deploy").symlink_to(pathlib.Path(__file__).resolve().parents[2] / "deploy")
+        environment = dict(os.environ, PATH=f"{pathlib.Path(options.understory).resolve().parent}:{os.environ['PATH']}", HOME=folder)
+        results = [check(guide, folder, environment, options.update) for guide in options.guides]
+    return 0 if all(results) else 1
 
 
 if __name__ == "__main__":
