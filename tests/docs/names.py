@@ -4,7 +4,8 @@
     names.py --understory COMMAND [ROOT]
 
 A file is any `path/to/file` whose first part is a folder of the tree; what its name goes on with may be missing (`docs/decisions/020`). Parameters are the first cells of the tables in docs/tuning.md, in the
-section of their process; docs/parameters.md, made from the processes, has all. A command is `understory WORD ...` in code: `--help` of its
+section of their process; docs/parameters.md, made from the processes, has all. Processes and channels of the picture of the architecture are those of
+services/*/main.cpp. A command is `understory WORD ...` in code: `--help` of its
 words must succeed and name its options.
 """
 import argparse
@@ -66,6 +67,20 @@ def missing_parameters(root):
                     yield f"docs/tuning.md: {process} has no parameter {key}"
 
 
+def missing_in_picture(root):
+    """The picture of the architecture: boxes of processes, labels with channels."""
+    mains = sorted((root / "services").glob("*/main.cpp"))
+    processes = {main.parent.name for main in mains}
+    channels = {channel for main in mains for channel in re.findall(r'\.\w+ = "([A-Z0-9_]+)"', main.read_text())}
+    text = (root / "docs/pictures/architecture.svg").read_text()
+    boxes = set(re.findall(r'class="n"[^>]*>([a-z_]+)<', text))
+    labels = {name for label in re.findall(r'class="l"[^>]*>([^<]+)<', text) for name in re.findall(r"\b[A-Z][A-Z_]{2,}\b", label)}
+    yield from (f"architecture.svg: no channel {name}" for name in sorted(labels - channels - {"HEALTH"}))
+    drivers = {name for name in processes if name.endswith("_driver")}  # One box for all.
+    yield from (f"architecture.svg: no box for {name}" for name in sorted(processes - drivers - boxes))
+    yield from (f"architecture.svg: no process {name}" for name in sorted(boxes - processes - {"sensors"}))
+
+
 @functools.cache
 def printed_help(understory, words):
     return subprocess.run([understory, *words, "--help"], capture_output=True, text=True, timeout=60, check=True).stdout
@@ -107,7 +122,7 @@ def main():
     parser.add_argument("--understory", required=True)
     parser.add_argument("root", nargs="?", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parents[2])
     options = parser.parse_args()
-    wrong, counted = list(missing_parameters(options.root)), 0
+    wrong, counted = [*missing_parameters(options.root), *missing_in_picture(options.root)], 0
     for file in pages(options.root):
         lines = list(code(file.read_text()))
         page = file.relative_to(options.root)
