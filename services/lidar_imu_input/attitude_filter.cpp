@@ -126,19 +126,22 @@ void AttitudeFilter::bridge(double seconds) {
   covariance_.block<3, 3>(3, 3).diagonal().array() += square(kBridgeSpeed) * seconds;
 }
 
-void AttitudeFilter::update(const Row& row, double residual, double variance) {
+void AttitudeFilter::update(const Row& row, double residual, double variance,
+                            const Covariance& kept) {
   const Eigen::Matrix<double, 13, 1> spread = covariance_ * row.transpose();
   const double total = row.dot(spread) + variance;
-  const Eigen::Matrix<double, 13, 1> gain = spread / total;
+  const Eigen::Matrix<double, 13, 1> gain = kept * spread / total;
   const Eigen::Matrix<double, 13, 1> error = gain * residual;
 
-  covariance_ -= gain * spread.transpose();
+  // For any gain, as Joseph's form.
+  covariance_ +=
+      total * gain * gain.transpose() - gain * spread.transpose() - spread * gain.transpose();
   with_mark_ -= gain * (row * with_mark_).eval();
   // Its correction is what the estimate was off by, turned round.
   const Eigen::RowVector2d of_rest = row * with_rest_;
   rest_.error_rad -= of_rest.transpose() * (residual / total);
   rest_.covariance -= of_rest.transpose() * of_rest / total;
-  with_rest_ -= gain * of_rest;
+  with_rest_ -= spread * of_rest / total;
   covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
 
   twist_rad_ += pitch_tangent(world_Q_vehicle_) *
@@ -157,6 +160,20 @@ void AttitudeFilter::add_velocity(const Eigen::Vector3d& direction, const Eigen:
   // d(w x at) / d(gyro bias) = [at]x
   row.segment<3>(6) = direction.transpose() * cross(at);
   update(row, residual_mps, square(sigma_mps));
+}
+
+void AttitudeFilter::add_velocity_off_ground(const Eigen::Vector3d& forward,
+                                             const Eigen::Vector3d& at, double residual_mps,
+                                             double sigma_mps) {
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  Row row = Row::Zero();
+  row.segment<3>(3) = up.transpose();
+  row.segment<3>(6) = up.transpose() * cross(at);
+
+  Covariance kept = Covariance::Identity();
+  kept.block<3, 3>(3, 3) -= forward * forward.transpose();
+  kept(12, 12) = 0.0;
+  update(row, residual_mps, square(sigma_mps), kept);
 }
 
 void AttitudeFilter::add_wheel_speed(const Eigen::Vector3d& forward, const Eigen::Vector3d& at,

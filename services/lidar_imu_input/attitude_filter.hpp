@@ -65,6 +65,12 @@ class AttitudeFilter {
   /// direction . (u + w x at); `direction` unit, `at` [m].
   void add_velocity(const Eigen::Vector3d& direction, const Eigen::Vector3d& at,
                     double residual_mps, double sigma_mps);
+  /// Updates with the velocity across the floor at `at` [m]. The body pitches on its springs, and
+  /// this velocity with it: where both go together the forward speed seems to be another one. So
+  /// the speed along `forward` and the wheels' scale are left as they are, and their errors counted
+  /// (a filter of Schmidt's kind; docs/decisions/170).
+  void add_velocity_off_ground(const Eigen::Vector3d& forward, const Eigen::Vector3d& at,
+                               double residual_mps, double sigma_mps);
   /// Updates with the speed along `forward` at `at` [m]: predicted without the wheels' scale, and
   /// as the wheels measured it.
   void add_wheel_speed(const Eigen::Vector3d& forward, const Eigen::Vector3d& at,
@@ -111,7 +117,9 @@ class AttitudeFilter {
 
  private:
   using Row = Eigen::Matrix<double, 1, 13>;
-  void update(const Row& row, double residual, double variance);
+  /// `kept`: what of the gain counts.
+  void update(const Row& row, double residual, double variance,
+              const Covariance& kept = Covariance::Identity());
   void mark_rest();
 
   ImuParameters imu_;

@@ -27,6 +27,8 @@ class DeadReckoning {
   void propagate_velocity(const LevelSample& a, const LevelSample& b);
   /// Motion over a time that no sample covers, in frame `vehicle_level`.
   void bridge(const geometry::SE2WithCovariance& motion);
+  /// The velocity becomes this one [m/s], as certain as it was.
+  void set_velocity(const Eigen::Vector2d& velocity_mps) { velocity_ = velocity_mps; }
   /// Updates with a velocity component: `residual_mps` = measured - predicted value of
   /// direction . (velocity + yaw rate x at); `direction` unit, `at` [m].
   void add_velocity(const Eigen::Vector2d& direction, const Eigen::Vector2d& at,

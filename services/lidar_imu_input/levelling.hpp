@@ -1,6 +1,9 @@
 // The IMU's latest sample, and the attitude that levels it.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
+#include <deque>
 #include <optional>
 
 #include "common/model/imu.hpp"
@@ -22,7 +25,13 @@ class Levelling {
   /// samples between the two were left out. Precondition: has begun.
   void propagate(const model::ImuSample& sample, bool is_saturated, double seconds);
   /// `seconds` pass that no sample covers: the attitude becomes less certain.
-  void bridge(double seconds) { attitude_->bridge(seconds); }
+  void bridge(double seconds);
+  /// The vehicle is at rest at `utime`, and the attitude has been told so.
+  void keep_rest(model::Utime utime);
+  /// The vehicle moves since some tenths of a second, but the attitude was told that it is at rest.
+  /// The attitude becomes that of half a second before at most, moved on by these samples (frame
+  /// vehicle, up to now), and is marked (mark_level()). None of it without a rest that was kept.
+  void start_moving(const std::deque<model::ImuSample>& samples);
   /// The sample in `vehicle_level`, by the attitude as it is now. Precondition: has begun.
   LevelSample level(const model::ImuSample& sample, bool is_saturated) const;
   /// The sample becomes the latest one.
@@ -42,19 +51,28 @@ class Levelling {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     bool has_attitude = self.attitude_.has_value();
-    a(has_attitude);
+    std::uint64_t rests = self.rests_.size();
+    a(has_attitude, rests);
     if constexpr (Archive::kReads) {
-      self.attitude_.reset();
-      const Eigen::Vector3d any_force(0.0, 0.0, kGravity_mps2);
-      if (has_attitude) self.attitude_.emplace(self.imu_, any_force);
+      const AttitudeFilter any(self.imu_, Eigen::Vector3d(0.0, 0.0, kGravity_mps2));
+      self.attitude_ = has_attitude ? std::optional(any) : std::nullopt;
+      self.rests_.assign(std::min<std::uint64_t>(rests, kRests), {0, any});
     }
     if (has_attitude) a(*self.attitude_);
+    for (auto& rest : self.rests_) a(rest.utime, rest.attitude);
     a(self.latest_, self.latest_level_);
   }
 
  private:
+  struct Rest {
+    model::Utime utime = 0;
+    AttitudeFilter attitude;
+  };
+  static constexpr std::size_t kRests = 2;
+
   ImuParameters imu_;
   std::optional<AttitudeFilter> attitude_;
+  std::deque<Rest> rests_;  ///< Of the last half second at rest, in order of time.
   std::optional<model::ImuSample> latest_;
   std::optional<LevelSample> latest_level_;
 };

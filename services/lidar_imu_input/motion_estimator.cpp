@@ -60,10 +60,12 @@ void MotionEstimator::propagate(const model::ImuSample& sample, bool is_saturate
   AttitudeFilter& attitude = *levelling_.attitude();
 
   // Standstill: velocity zero, and the gyro shows its bias.
+  const bool was_stationary = stationary_.moved_utime() < levelling_.latest()->utime;
   stationary_.add(lever_.latest_raw(), seconds, attitude.gyro_bias(),
                   VelocityEvidence::of(pose_.reckoning(), speeds_.are_fresh(sample.utime),
                                        corrections_.applied_utime()));
   if (is_stationary()) use_standstill(sample, seconds);
+  if (was_stationary && !is_stationary()) start_moving();
 
   // Dead reckoning, and the samples of the next increment.
   const LevelSample levelled = levelling_.level(sample, is_saturated);
@@ -76,6 +78,16 @@ void MotionEstimator::propagate(const model::ImuSample& sample, bool is_saturate
   if (!is_stationary())
     constraints_.apply(sample, levelled.yaw_rate_rad_s, speeds_.are_fresh(sample.utime), attitude,
                        pose_.reckoning());
+}
+
+/// The standstill ended some tenths of a second ago: since then zero velocity was measured in vain.
+void MotionEstimator::start_moving() {
+  levelling_.start_moving(stationary_.window());
+  const AttitudeFilter& attitude = *levelling_.attitude();
+  stationary_.learn_bias(attitude);
+  DeadReckoning& reckoning = pose_.reckoning();
+  reckoning.set_gyro_bias(stationary_.bias().bias_rad_s, stationary_.bias().sigma_rad_s);
+  reckoning.set_velocity((attitude.level_Q_vehicle() * attitude.velocity()).head<2>());
 }
 
 void MotionEstimator::bridge_gap(const model::ImuSample& sample) {
@@ -96,6 +108,7 @@ void MotionEstimator::use_standstill(const model::ImuSample& sample, double seco
   AttitudeFilter& attitude = *levelling_.attitude();
   const double sigma = parameters_.standstill.velocity_sigma_mps;
   attitude.add_standstill(sample.angular_rate_rad_s, seconds, sigma);
+  levelling_.keep_rest(sample.utime);
   rest_.add_stationary(stationary_.moved_utime(), sample.utime);
 
   // The bias of the heading's rate: what the filter has learned while stationary, nothing else.

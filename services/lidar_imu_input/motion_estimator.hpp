@@ -80,6 +80,7 @@ class MotionEstimator {
   double middle_speed(const model::WheelSample& sample, const MotionState* then) const;
   void correct_by_wheels(const model::WheelSample& sample, const MotionState& then);
   void correct_by_wheels_reached(const model::ImuSample& sample);
+  void start_moving();
   void use_standstill(const model::ImuSample& sample, double seconds);
   void use_corrections(model::Utime now);
 

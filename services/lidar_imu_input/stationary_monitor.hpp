@@ -52,6 +52,9 @@ class StationaryMonitor {
   bool is_stationary_since(model::Utime utime) const { return moved_utime_ <= utime; }
   /// When it was last found to move.
   model::Utime moved_utime() const { return moved_utime_; }
+  /// The latest samples (frame vehicle), `window_s` long at most. The first 0.2 s of a soft start
+  /// are quiet as well, and count as standing until the motion shows.
+  const std::deque<model::ImuSample>& window() const { return detector_.window(); }
   /// Bias of the heading's rate, from standstills only; its sigma grows while the vehicle moves.
   const YawRateBias& bias() const { return bias_; }
 

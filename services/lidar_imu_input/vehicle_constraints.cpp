@@ -49,7 +49,7 @@ void VehicleConstraints::exclude_slip(const model::ImuSample& sample, double lev
 
   // In frame vehicle: the axle moves neither sideways nor off the ground.
   attitude.add_velocity(axle_.left, axle_.position_m, -axle.dot(axle_.left), side);
-  attitude.add_velocity(Eigen::Vector3d::UnitZ(), axle_.position_m, -axle.z(), vertical);
+  attitude.add_velocity_off_ground(axle_.forward, axle_.position_m, -axle.z(), vertical);
 
   // In the plane.
   const Eigen::Vector2d at = axle_.position_m.head<2>();

@@ -136,10 +136,11 @@ TEST_CASE("What is published of the level at rest becomes better, and ends", "[a
     CHECK(level.sequence == i);
     CHECK(level.rest_utime <= level.utime);
 
-    // At rest next to nothing is found, and then and now are the same.
+    // At rest next to nothing is found, and then and now are the same, but for the noise of the
+    // last tenths of a second: a rest that has just ended is the one before the motion showed.
     if (level.rest_utime == level.utime) {
       CHECK(level.error_rad.norm() < 2e-4);
-      CHECK(level.change_covariance.norm() < 4e-8);
+      CHECK(level.change_covariance.norm() < 1e-7);
       ++rest_messages;
       continue;
     }

@@ -26,7 +26,8 @@ LidarImuInputParameters parameters_of(const sim::SensorSuite& suite) {
 }
 
 struct Drive {
-  explicit Drive(std::uint64_t seed, bool has_wheels, double length_m, bool has_lidar) {
+  explicit Drive(std::uint64_t seed, bool has_wheels, double length_m, bool has_lidar,
+                 double wheel_scale_sigma = 5e-3) {
     sim::ForestScenarioParameters forest;
     forest.length_m = length_m;
     forest.margin_m = 60.0;
@@ -34,6 +35,7 @@ struct Drive {
     suite.truth_rate_hz = 1.0;
     suite.lidar->columns = 360;
     suite.lidar->elevations_rad = sim::beam_elevations_rad(sim::LidarModel::kVlp16);
+    suite.wheels->scale_sigma = wheel_scale_sigma;
     parameters = parameters_of(suite);
     if (!has_wheels) suite.wheels.reset();
     if (!has_lidar) suite.lidar.reset();
@@ -168,6 +170,27 @@ TEST_CASE("a simulated drive with wheels: attitude, odometry and its consistency
     CHECK(figures.inertial_nees / figures.increments > 0.5);
   }
   CHECK(nees < 7.8);
+}
+
+TEST_CASE("the wheels' scale is found without bias, whatever the ground and the start", "[sim]") {
+  constexpr int kRuns = 8;
+  double mean_error = 0.0;
+  double nees = 0.0;
+  for (std::uint64_t seed = 11; seed < 11 + kRuns; ++seed) {
+    Drive scene(seed, true, 500.0, false, 0.0);
+    LidarImuInput input(scene.parameters);
+    while (const auto reading = scene.drive->next()) {
+      if (const auto* imu = std::get_if<model::ImuSample>(&*reading)) input.add(*imu);
+      if (const auto* wheels = std::get_if<model::WheelSample>(&*reading)) input.add(*wheels);
+    }
+    const AttitudeFilter& attitude = *input.motion().attitude();
+    const double error = attitude.wheel_scale() - 1.0;
+    mean_error += error / kRuns;
+    nees += std::pow(error / attitude.wheel_scale_sigma(), 2) / kRuns;
+  }
+  INFO("mean error " << mean_error << ", NEES " << nees);
+  CHECK(std::abs(mean_error) < 0.003);
+  CHECK(nees < 2.0);
 }
 
 TEST_CASE("a simulated drive without wheels", "[sim]") {
