@@ -8,6 +8,8 @@ namespace understory::cli {
 
 /// `understory doctor`: checks this computer.
 void add_doctor_command(CLI::App& parent);
+/// `understory eval`: the experiments, which `understory-eval` runs.
+void add_eval_command(CLI::App& parent);
 /// `understory export`: results in formats that other tools read.
 void add_export_command(CLI::App& parent);
 /// `understory import`: a recording made elsewhere into an LCM log.

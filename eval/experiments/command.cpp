@@ -21,9 +21,7 @@
 
 namespace understory::eval::experiments {
 
-void add_eval_command(CLI::App& parent) {
-  CLI::App& eval =
-      *parent.add_subcommand("eval", "Experiments: tables beside published figures, JSON, plots");
+void add_experiments(CLI::App& eval) {
   eval.require_subcommand(1);
   accuracy::add_paths_experiment(eval);
   accuracy::add_density_experiment(eval);

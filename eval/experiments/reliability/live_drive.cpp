@@ -61,7 +61,7 @@ std::filesystem::path beside_this_program(const std::string& name) {
 void start_stack(Processes& processes, const LiveOptions& options, const std::string& url,
                  const std::filesystem::path& state) {
   if (options.supervised) {
-    processes.start({"/proc/self/exe",
+    processes.start({beside_this_program("understory"),
                      {"launch", "--config", options.config_dir, "--state-dir", state, "--lcm-url",
                       url, "--quiet"},
                      {}});

@@ -1,0 +1,39 @@
+// `understory eval`: the experiments, a program of their own that a vehicle need not have.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/paths.hpp"
+
+namespace understory::cli {
+namespace {
+
+/// Becomes `understory-eval` with these arguments; comes back only by an error.
+[[noreturn]] void become_eval(std::vector<std::string> words) {
+  words.insert(words.begin(), find_executable("understory-eval"));
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+
+  ::execvp(argv.front(), argv.data());
+  fail(
+      fmt::format("eval: {}: {}; the experiments are a program of their own: install the package "
+                  "understory-eval, or build it (ninja -C build/release understory-eval)",
+                  words.front(), std::strerror(errno)));
+}
+
+}  // namespace
+
+void add_eval_command(CLI::App& parent) {
+  auto* command = parent.add_subcommand(
+      "eval", "Experiments: tables beside published figures, JSON, plots (understory-eval)");
+  command->set_help_flag();  // Theirs, too, is understory-eval's.
+  command->prefix_command();
+  command->callback([command] { become_eval(command->remaining()); });
+}
+
+}  // namespace understory::cli
