@@ -14,8 +14,8 @@
 namespace understory::bus {
 namespace {
 
-constexpr std::array<std::string_view, 6> kProcessKeys{"name",      "executable",  "config",
-                                                       "arguments", "keeps_state", "ends_last"};
+constexpr std::array<std::string_view, 7> kProcessKeys{
+    "name", "executable", "config", "arguments", "is_service", "keeps_state", "ends_last"};
 
 /// A name is also that of the folder of the process's state, which `--fresh` deletes: it must not
 /// lead elsewhere.
@@ -130,7 +130,8 @@ class LaunchReader {
     }
 
     entry.arguments = texts(*table, "arguments");
-    entry.keeps_state = flag(*table, "keeps_state", entry.keeps_state);
+    entry.is_service = flag(*table, "is_service", entry.is_service);
+    entry.keeps_state = flag(*table, "keeps_state", entry.is_service);
     entry.ends_last = flag(*table, "ends_last", entry.ends_last);
 
     for (const auto& other : before.processes) {

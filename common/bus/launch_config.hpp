@@ -13,8 +13,9 @@ struct ProcessEntry {
   std::string executable;              ///< Beside the understory command, in PATH, or a path.
   std::filesystem::path config;        ///< Beside launch.toml unless absolute; empty = none.
   std::vector<std::string> arguments;  ///< Further ones, unchanged.
-  bool keeps_state = true;             ///< Whether it is given --state-dir.
-  bool ends_last = false;  ///< Asked to end when all others have: it keeps their last words.
+  bool is_service = true;   ///< False: another program, without HEALTH, state or place in a replay.
+  bool keeps_state = true;  ///< Whether it is given --state-dir.
+  bool ends_last = false;   ///< Asked to end when all others have: it keeps their last words.
 };
 
 /// The content of launch.toml.

@@ -57,7 +57,7 @@ bool has_multicast(const std::string& flags) {
 }
 
 constexpr const char* kRouteAdvice =
-    "ip link set lo multicast on; ip route add 224.0.0.0/4 dev lo (or deploy/setup)";
+    "ip link set lo multicast on; ip route add 224.0.0.0/4 dev lo src 127.0.0.1 (or deploy/setup)";
 
 }  // namespace
 

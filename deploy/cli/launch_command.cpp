@@ -93,6 +93,7 @@ std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options,
   for (const auto& entry : entries) {
     launch::ProcessSpec spec;
     spec.name = entry.name;
+    spec.sends_health = entry.is_service;
     spec.ends_last = entry.ends_last;
     spec.command.executable = find_executable(entry.executable);
 

@@ -37,13 +37,15 @@ bool reads_a_sensor(const std::string& name) {
 }
 
 /// The processes that the configuration launches, so that one directory has the same effect live
-/// and here, but for those that read a sensor; both mapping stages where it has no launch.toml.
+/// and here, but for other programs and those that read a sensor; both mapping stages where it has
+/// no launch.toml.
 std::vector<std::string> stages_of(const std::filesystem::path& config) {
   if (!std::filesystem::exists(config / "launch.toml")) return {"keyframer", "geoslam_mapper"};
   std::vector<std::string> names;
   try {
     for (auto& process : bus::read_launch_config(config).processes) {
-      if (!reads_a_sensor(process.name)) names.push_back(std::move(process.name));
+      if (process.is_service && !reads_a_sensor(process.name))
+        names.push_back(std::move(process.name));
     }
   } catch (const bus::ConfigurationError& error) {
     wrong_usage(error.what());

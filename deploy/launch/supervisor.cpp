@@ -235,8 +235,8 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
     return;
   }
 
-  const bool is_never_heard =
-      !entry.last_heartbeat && now - entry.listened_since >= parameters_.never_heard_degraded;
+  const bool is_never_heard = entry.spec.sends_health && !entry.last_heartbeat &&
+                              now - entry.listened_since >= parameters_.never_heard_degraded;
   const bool degraded = stopped_for >= parameters_.stopped_degraded ||
                         silent_for >= parameters_.silent_degraded || is_never_heard;
   if (degraded && entry.state == ProcessState::kRunning) {

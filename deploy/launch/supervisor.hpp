@@ -19,13 +19,14 @@ namespace understory::launch {
 struct ProcessSpec {
   std::string name;  ///< As in its HEALTH messages.
   Command command;
+  bool sends_health = true;  ///< False: not having heard it says nothing.
   bool ends_last = false;  ///< It is asked to end when all others have: it keeps their last words.
 };
 
 /// A process that is stopped (SIGSTOP) is noticed in /proc within a tenth of a second, hence the
 /// short times. Any other hang shows only as missing HEALTH, which comes once a second: three
 /// missed are DEGRADED, five a hang. Fewer would restart healthy processes on a busy computer. A
-/// process that was never heard is DEGRADED, but not killed: it may be one that has no HEALTH.
+/// process that was never heard is DEGRADED, but not killed.
 ///
 /// Time in which the supervisor itself did not run (it was stopped, the computer was suspended or
 /// overloaded) is no silence of a process: all these times are extended by it.

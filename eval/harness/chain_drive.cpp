@@ -144,7 +144,8 @@ std::vector<bus::Service> services_of(const std::filesystem::path& config_dir) {
   all.push_back(existence_tracker::existence_tracker_service());
   std::set<std::string> started;
   for (const bus::ProcessEntry& entry : bus::read_launch_config(config_dir).processes) {
-    if (entry.name.ends_with(kSensorDriver) || entry.name == kStore || entry.name == kViewer)
+    if (!entry.is_service || entry.name.ends_with(kSensorDriver) || entry.name == kStore ||
+        entry.name == kViewer)
       continue;
     if (std::ranges::find(all, entry.name, &bus::Service::name) == all.end()) {
       throw bus::ConfigurationError({(config_dir / "launch.toml").string() + ": process \"" +

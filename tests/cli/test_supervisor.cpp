@@ -246,12 +246,15 @@ TEST_CASE("a process that was never heard is degraded, and not killed", "[launch
   launch::SupervisorParameters parameters;
   parameters.never_heard_degraded = launch::milliseconds(200);
   parameters.silent_degraded = launch::milliseconds(5000);
-  Bench bench({shell("a", "exec sleep 1000"), shell("b", "exec sleep 1000")}, parameters);
+  launch::ProcessSpec silent = shell("c", "exec sleep 1000");
+  silent.sends_health = false;
+  Bench bench({shell("a", "exec sleep 1000"), shell("b", "exec sleep 1000"), silent}, parameters);
   bench.supervisor.start({}, launch::Clock::now());
   bench.supervisor.heartbeat("b", bench.status(1).pid, launch::Clock::now());
   REQUIRE(
       bench.run_until([&] { return bench.status(0).state == launch::ProcessState::kDegraded; }));
   CHECK(bench.status(1).state == launch::ProcessState::kRunning);
+  CHECK(bench.status(2).state == launch::ProcessState::kRunning);
   CHECK_THAT(bench.said, Contains("a: DEGRADED: no HEALTH since its start"));
 
   bench.supervisor.heartbeat("a", bench.status(0).pid, launch::Clock::now());
@@ -340,6 +343,7 @@ TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
   CHECK_THAT(refused(good + "colour = 1\n"), Contains("launch.toml:4") && Contains("colour"));
   CHECK_THAT(refused(good + "config = \"none.toml\"\n"), Contains(":4") && Contains("none.toml"));
   CHECK_THAT(refused(good + "arguments = [1]\n"), Contains(":4") && Contains("arguments"));
+  CHECK_THAT(refused(good + "is_service = 0\n"), Contains(":4") && Contains("is_service"));
   CHECK_THAT(refused(good + "keeps_state = 1\n"), Contains(":4") && Contains("keeps_state"));
   CHECK_THAT(refused(good + "ends_last = \"yes\"\n"), Contains(":4") && Contains("ends_last"));
 
