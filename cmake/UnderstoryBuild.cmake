@@ -1,5 +1,7 @@
 # Compiler settings and the three functions by which every folder declares what it builds.
 include(GNUInstallDirs)
+# One component for each package (UnderstoryPackages.cmake): dev where an install() names none.
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -28,10 +30,11 @@ if(UNDERSTORY_SANITIZE)
 endif()
 install(TARGETS understory_flags EXPORT understory)
 
-# understory_library(NAME PUBLIC targets... PRIVATE targets...)
+# understory_library(NAME [INTERNAL] PUBLIC targets... PRIVATE targets...)
 # Builds understory::NAME from every .cpp beside the calling CMakeLists.txt and in the folders below.
+# INTERNAL: part of a program, not installed.
 function(understory_library name)
-  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "INTERNAL" "" "PUBLIC;PRIVATE" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
   list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
   if(sources)
@@ -52,6 +55,9 @@ function(understory_library name)
   # Programs that link an installed library compile its headers: the standard travels with it.
   target_compile_features(understory_${name} ${scope} cxx_std_20)
   target_link_libraries(understory_${name} ${scope} ${ARG_PUBLIC})
+  if(ARG_INTERNAL)
+    return()
+  endif()
   install(TARGETS understory_${name} EXPORT understory ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   file(RELATIVE_PATH here "${CMAKE_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
   install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/understory/${here}
@@ -67,7 +73,7 @@ function(understory_service name)
     string(REPLACE "_" "-" dashed ${name})
     add_executable(understory-${dashed} main.cpp)
     target_link_libraries(understory-${dashed} PRIVATE understory::${name} understory_flags)
-    install(TARGETS understory-${dashed})
+    install(TARGETS understory-${dashed} COMPONENT runtime)
   endif()
 endfunction()
 
