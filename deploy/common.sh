@@ -16,7 +16,7 @@ build_all() {
       "-DUNDERSTORY_WERROR=${UNDERSTORY_WERROR:-OFF}" > "$build.configure.log" 2>&1 ||
       { tail -n 30 "$build.configure.log" >&2; fail "configuring failed"; }
   fi
-  say "build with $jobs jobs (from nothing about six minutes on two cores, seconds when nothing changed)"
+  say "build with $jobs jobs (from nothing ten minutes and more on two cores, seconds when nothing changed)"
   ninja -C "$build" -j "$jobs" "$@" || fail "the build failed"
   say "built in $((SECONDS - start)) s"
 }
