@@ -214,6 +214,13 @@ Eigen::Matrix2d AttitudeFilter::tilt_change_covariance() const {
 
 Eigen::Quaterniond AttitudeFilter::level_Q_vehicle() const { return tilt_of(world_Q_vehicle_); }
 
+LevelVelocity AttitudeFilter::level_velocity() const {
+  const Eigen::Matrix3d level_R_vehicle = level_Q_vehicle().toRotationMatrix();
+  const Eigen::Matrix3d covariance =
+      level_R_vehicle * velocity_covariance() * level_R_vehicle.transpose();
+  return {(level_R_vehicle * velocity_).head<2>(), covariance.topLeftCorner<2, 2>()};
+}
+
 Eigen::Matrix2d AttitudeFilter::tilt_covariance() const {
   const Eigen::Matrix<double, 2, 3> level = level_of_attitude(world_Q_vehicle_);
   return level * covariance_.block<3, 3>(0, 0) * level.transpose();

@@ -28,6 +28,12 @@ struct RollPitchYaw {
 /// The angles of a unit quaternion; pitch in [-pi / 2, pi / 2].
 RollPitchYaw roll_pitch_yaw(const Eigen::Quaterniond& rotation);
 
+/// A velocity in `vehicle_level` [m/s].
+struct LevelVelocity {
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance_m2ps2 = Eigen::Matrix2d::Zero();
+};
+
 /// The error of (roll, pitch) at the last standstill, as all since has shown it: a fixed-point
 /// smoother (Anderson & Moore 1979, section 7.2).
 struct RestTilt {
@@ -98,6 +104,8 @@ class AttitudeFilter {
   /// mark [rad]: on a slope they do. What is levelled by it rotates alike.
   double twist_since_mark_rad() const { return twist_rad_; }
   const Eigen::Vector3d& velocity() const { return velocity_; }  ///< Frame vehicle.
+  /// velocity() in the level frame: forward and left, with its covariance [m/s].
+  LevelVelocity level_velocity() const;
   /// Of velocity() [m^2/s^2].
   Eigen::Matrix3d velocity_covariance() const { return covariance_.block<3, 3>(3, 3); }
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< [rad/s]
@@ -117,7 +125,7 @@ class AttitudeFilter {
 
  private:
   using Row = Eigen::Matrix<double, 1, 13>;
-  /// `kept`: what of the gain counts.
+  /// The optimal gain is multiplied by `kept`.
   void update(const Row& row, double residual, double variance,
               const Covariance& kept = Covariance::Identity());
   void mark_rest();

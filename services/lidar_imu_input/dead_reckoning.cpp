@@ -124,6 +124,13 @@ void DeadReckoning::add_heading(double residual_rad, double sigma_rad) {
   update(row, residual_rad, square(sigma_rad), true);
 }
 
+void DeadReckoning::set_velocity(const LevelVelocity& velocity) {
+  velocity_ = velocity.velocity_mps;
+  covariance_.middleRows<2>(3).setZero();
+  covariance_.middleCols<2>(3).setZero();
+  covariance_.block<2, 2>(3, 3) = velocity.covariance_m2ps2;
+}
+
 void DeadReckoning::set_gyro_bias(double bias_rad_s, double sigma_rad_s) {
   bias_(0) = bias_rad_s;
   covariance_.row(5).setZero();

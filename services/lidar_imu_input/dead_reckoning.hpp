@@ -5,6 +5,7 @@
 
 #include "common/geometry/se2.hpp"
 #include "common/model/ekf_output.hpp"
+#include "services/lidar_imu_input/attitude_filter.hpp"
 #include "services/lidar_imu_input/level_motion.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
 
@@ -27,8 +28,8 @@ class DeadReckoning {
   void propagate_velocity(const LevelSample& a, const LevelSample& b);
   /// Motion over a time that no sample covers, in frame `vehicle_level`.
   void bridge(const geometry::SE2WithCovariance& motion);
-  /// The velocity becomes this one [m/s], as certain as it was.
-  void set_velocity(const Eigen::Vector2d& velocity_mps) { velocity_ = velocity_mps; }
+  /// The velocity becomes this one, independent of everything else.
+  void set_velocity(const LevelVelocity& velocity);
   /// Updates with a velocity component: `residual_mps` = measured - predicted value of
   /// direction . (velocity + yaw rate x at); `direction` unit, `at` [m].
   void add_velocity(const Eigen::Vector2d& direction, const Eigen::Vector2d& at,

@@ -7,7 +7,7 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-/// The motion that is noticed last began later than twice this before.
+/// When motion is noticed, it began at most this long ago.
 constexpr double kBetweenRests_s = 0.2;
 
 }  // namespace
@@ -19,35 +19,46 @@ void Levelling::begin(const model::ImuSample& sample) {
 
 void Levelling::bridge(double seconds) {
   rests_.clear();
+  since_rest_.clear();
   attitude_->bridge(seconds);
 }
 
 void Levelling::propagate(const model::ImuSample& sample, bool is_saturated, double seconds) {
-  attitude_->propagate(0.5 * (latest_->angular_rate_rad_s + sample.angular_rate_rad_s),
-                       0.5 * (latest_->specific_force_mps2 + sample.specific_force_mps2), seconds,
+  propagate(*latest_, sample, is_saturated, seconds);
+  if (!rests_.empty()) since_rest_.push_back({sample, is_saturated});
+}
+
+void Levelling::propagate(const model::ImuSample& from, const model::ImuSample& to,
+                          bool is_saturated, double seconds) {
+  attitude_->propagate(0.5 * (from.angular_rate_rad_s + to.angular_rate_rad_s),
+                       0.5 * (from.specific_force_mps2 + to.specific_force_mps2), seconds,
                        is_saturated);
 }
 
-void Levelling::keep_rest(model::Utime utime) {
-  if (!rests_.empty() && seconds_between(rests_.back().utime, utime) < kBetweenRests_s) return;
-  rests_.push_back({utime, *attitude_});
-  if (rests_.size() > kRests) rests_.pop_front();
+void Levelling::keep_rest(const model::ImuSample& sample) {
+  if (!rests_.empty() && seconds_between(rests_.back().utime, sample.utime) < kBetweenRests_s)
+    return;
+  rests_.push_back({sample.utime, *attitude_});
+  if (since_rest_.empty()) since_rest_.push_back({sample, false});
+  if (rests_.size() <= kRests) return;
+
+  rests_.pop_front();
+  while (since_rest_.front().sample.utime < rests_.front().utime) since_rest_.pop_front();
 }
 
-void Levelling::start_moving(const std::deque<model::ImuSample>& samples) {
-  if (rests_.empty()) return;
-  const Rest rest = rests_.front();
-  rests_.clear();
-  attitude_ = rest.attitude;
-  for (std::size_t i = 1; i < samples.size(); ++i) {
-    const model::ImuSample& from = samples[i - 1];
-    const model::ImuSample& to = samples[i];
-    if (to.utime <= rest.utime) continue;
-    attitude_->propagate(0.5 * (from.angular_rate_rad_s + to.angular_rate_rad_s),
-                         0.5 * (from.specific_force_mps2 + to.specific_force_mps2),
-                         seconds_between(from.utime, to.utime), false);
+std::optional<model::Utime> Levelling::start_moving() {
+  if (rests_.empty()) return std::nullopt;
+  const model::Utime utime = rests_.front().utime;
+  attitude_ = rests_.front().attitude;
+  for (std::size_t i = 1; i < since_rest_.size(); ++i) {
+    const model::ImuSample& before = since_rest_[i - 1].sample;
+    const auto& [sample, is_saturated] = since_rest_[i];
+    propagate(before, sample, is_saturated, seconds_between(before.utime, sample.utime));
   }
   attitude_->mark_level();
+  rests_.clear();
+  since_rest_.clear();
+  return utime;
 }
 
 LevelSample Levelling::level(const model::ImuSample& sample, bool is_saturated) const {

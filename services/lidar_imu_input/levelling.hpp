@@ -1,10 +1,10 @@
 // The IMU's latest sample, and the attitude that levels it.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <stdexcept>
 
 #include "common/model/imu.hpp"
 #include "services/lidar_imu_input/attitude_filter.hpp"
@@ -26,12 +26,13 @@ class Levelling {
   void propagate(const model::ImuSample& sample, bool is_saturated, double seconds);
   /// `seconds` pass that no sample covers: the attitude becomes less certain.
   void bridge(double seconds);
-  /// The vehicle is at rest at `utime`, and the attitude has been told so.
-  void keep_rest(model::Utime utime);
-  /// The vehicle moves since some tenths of a second, but the attitude was told that it is at rest.
-  /// The attitude becomes that of half a second before at most, moved on by these samples (frame
-  /// vehicle, up to now), and is marked (mark_level()). None of it without a rest that was kept.
-  void start_moving(const std::deque<model::ImuSample>& samples);
+  /// The vehicle is at rest at this sample, up to which the attitude was propagated, and the
+  /// attitude was told so.
+  void keep_rest(const model::ImuSample& sample);
+  /// The vehicle has moved for some tenths of a second, but the attitude was told that it is at
+  /// rest. The attitude becomes that of 0.2 to 0.4 s ago, propagated by the samples since, and is
+  /// marked (mark_level()). Gives the time to which it went back; does nothing if no rest was kept.
+  std::optional<model::Utime> start_moving();
   /// The sample in `vehicle_level`, by the attitude as it is now. Precondition: has begun.
   LevelSample level(const model::ImuSample& sample, bool is_saturated) const;
   /// The sample becomes the latest one.
@@ -45,7 +46,10 @@ class Levelling {
   /// The same sample levelled.
   const std::optional<LevelSample>& latest_level() const { return latest_level_; }
   /// Whether a loaded state keeps the invariant.
-  bool is_whole() const { return !attitude_ || (latest_ && latest_level_); }
+  bool is_whole() const {
+    const bool has_begun = attitude_.has_value();
+    return has_begun == latest_.has_value() && has_begun == latest_level_.has_value();
+  }
 
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
@@ -56,14 +60,19 @@ class Levelling {
     if constexpr (Archive::kReads) {
       const AttitudeFilter any(self.imu_, Eigen::Vector3d(0.0, 0.0, kGravity_mps2));
       self.attitude_ = has_attitude ? std::optional(any) : std::nullopt;
-      self.rests_.assign(std::min<std::uint64_t>(rests, kRests), {0, any});
+      if (rests > kRests || (rests > 0 && !has_attitude))
+        throw std::invalid_argument("rests of an attitude that no state has");
+      self.rests_.assign(rests, {0, any});
     }
     if (has_attitude) a(*self.attitude_);
     for (auto& rest : self.rests_) a(rest.utime, rest.attitude);
-    a(self.latest_, self.latest_level_);
+    a(self.since_rest_, self.latest_, self.latest_level_);
   }
 
  private:
+  void propagate(const model::ImuSample& from, const model::ImuSample& to, bool is_saturated,
+                 double seconds);
+
   struct Rest {
     model::Utime utime = 0;
     AttitudeFilter attitude;
@@ -72,7 +81,18 @@ class Levelling {
 
   ImuParameters imu_;
   std::optional<AttitudeFilter> attitude_;
-  std::deque<Rest> rests_;  ///< Of the last half second at rest, in order of time.
+  /// A sample, and whether samples before it were left out.
+  struct Step {
+    model::ImuSample sample;
+    bool is_saturated = false;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& self) {
+      a(self.sample, self.is_saturated);
+    }
+  };
+  std::deque<Rest> rests_;       ///< The latest ones, in order of time.
+  std::deque<Step> since_rest_;  ///< From the older rest's sample on; empty without rests.
   std::optional<model::ImuSample> latest_;
   std::optional<LevelSample> latest_level_;
 };

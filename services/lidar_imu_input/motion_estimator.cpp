@@ -65,12 +65,14 @@ void MotionEstimator::propagate(const model::ImuSample& sample, bool is_saturate
                   VelocityEvidence::of(pose_.reckoning(), speeds_.are_fresh(sample.utime),
                                        corrections_.applied_utime()));
   if (is_stationary()) use_standstill(sample, seconds);
-  if (was_stationary && !is_stationary()) start_moving();
+  const bool starts = was_stationary && !is_stationary();
+  if (starts) go_back_to_rest();
 
   // Dead reckoning, and the samples of the next increment.
   const LevelSample levelled = levelling_.level(sample, is_saturated);
   const double climb_mps = (attitude.level_Q_vehicle() * attitude.velocity()).z();
   pose_.propagate(*levelling_.latest_level(), levelled, climb_mps, seconds);
+  if (starts) pose_.reckoning().set_velocity(attitude.level_velocity());
   increments_.add(levelled);
   levelling_.set_latest(sample, levelled);
 
@@ -80,14 +82,15 @@ void MotionEstimator::propagate(const model::ImuSample& sample, bool is_saturate
                        pose_.reckoning());
 }
 
-/// The standstill ended some tenths of a second ago: since then zero velocity was measured in vain.
-void MotionEstimator::start_moving() {
-  levelling_.start_moving(stationary_.window());
-  const AttitudeFilter& attitude = *levelling_.attitude();
-  stationary_.learn_bias(attitude);
-  DeadReckoning& reckoning = pose_.reckoning();
-  reckoning.set_gyro_bias(stationary_.bias().bias_rad_s, stationary_.bias().sigma_rad_s);
-  reckoning.set_velocity((attitude.level_Q_vehicle() * attitude.velocity()).head<2>());
+/// The standstill ended some tenths of a second ago; since then zero velocity was measured although
+/// the vehicle moved.
+void MotionEstimator::go_back_to_rest() {
+  const auto rest_utime = levelling_.start_moving();
+  if (!rest_utime) return;
+  rest_.go_back(*rest_utime);
+  stationary_.learn_bias(*levelling_.attitude());
+  const YawRateBias& bias = stationary_.bias();
+  pose_.reckoning().set_gyro_bias(bias.bias_rad_s, bias.sigma_rad_s);
 }
 
 void MotionEstimator::bridge_gap(const model::ImuSample& sample) {
@@ -108,7 +111,7 @@ void MotionEstimator::use_standstill(const model::ImuSample& sample, double seco
   AttitudeFilter& attitude = *levelling_.attitude();
   const double sigma = parameters_.standstill.velocity_sigma_mps;
   attitude.add_standstill(sample.angular_rate_rad_s, seconds, sigma);
-  levelling_.keep_rest(sample.utime);
+  levelling_.keep_rest(sample);
   rest_.add_stationary(stationary_.moved_utime(), sample.utime);
 
   // The bias of the heading's rate: what the filter has learned while stationary, nothing else.
@@ -131,7 +134,7 @@ void MotionEstimator::add_wheels(const model::WheelSample& sample) {
   if (!latest) return;
   if (seconds_between(latest->utime, sample.utime) > parameters_.imu.max_gap_s) {
     ahead_.push_back(sample);
-    if (seconds_between(ahead_.front().utime, sample.utime) > kLatestImu_s) ahead_.pop_front();
+    while (seconds_between(ahead_.front().utime, sample.utime) > kLatestImu_s) ahead_.pop_front();
     return;
   }
   // What comes late in one burst has one error of the velocity then: counted once for each sample
@@ -163,7 +166,7 @@ void MotionEstimator::correct_by_wheels(const model::WheelSample& sample, const 
                                *levelling_.attitude(), pose_.reckoning());
 }
 
-/// Wheel samples whose time an IMU sample has reached that came late.
+/// Uses the wheel samples that waited until the IMU reached their time.
 void MotionEstimator::correct_by_wheels_reached(const model::ImuSample& sample) {
   while (!ahead_.empty() && ahead_.front().utime <= sample.utime) {
     correct_by_wheels(ahead_.front(), pose_.state_at(sample, *levelling_.attitude()));

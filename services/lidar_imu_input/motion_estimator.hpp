@@ -35,8 +35,8 @@ class MotionEstimator {
   /// Takes a sample that to_vehicle() gave. `is_saturated`: the samples before it were left out
   /// since a sensor was at the end of its range.
   void add_imu(const model::ImuSample& vehicle_sample, bool is_saturated);
-  /// Takes speed and steering. Attitude and velocity are those of the latest IMU sample: what the
-  /// wheels measure of a later time corrects them when the IMU gets there.
+  /// Takes speed and steering. Attitude and velocity are those of the latest IMU sample: a sample
+  /// that is later than that by more than `imu.max_gap_s` corrects them when the IMU gets there.
   void add_wheels(const model::WheelSample& sample);
   /// Takes a fix: ignored unless `gnss_aided`.
   void add_gnss(const model::GnssFix& fix);
@@ -80,7 +80,7 @@ class MotionEstimator {
   double middle_speed(const model::WheelSample& sample, const MotionState* then) const;
   void correct_by_wheels(const model::WheelSample& sample, const MotionState& then);
   void correct_by_wheels_reached(const model::ImuSample& sample);
-  void start_moving();
+  void go_back_to_rest();
   void use_standstill(const model::ImuSample& sample, double seconds);
   void use_corrections(model::Utime now);
 
@@ -95,7 +95,7 @@ class MotionEstimator {
   VelocityCorrections corrections_;
   MotionIncrements increments_;
   RestWatch rest_;
-  std::deque<model::WheelSample> ahead_;  ///< Of later than the IMU, in order of time.
+  std::deque<model::WheelSample> ahead_;  ///< Later than the IMU, in order of time.
 };
 
 }  // namespace understory::lidar_imu_input

@@ -9,13 +9,13 @@ namespace understory::lidar_imu_input {
 
 void PoseTrack::propagate(const LevelSample& from, const LevelSample& to, double climb_mps,
                           double seconds) {
-  if (utime_ && to.utime <= *utime_) {
-    // The wheels have moved the pose over this time; the sample comes late.
-    reckoning_.propagate_velocity(from, to);
-    return;
-  }
-  reckoning_.propagate(from, to);
-  height_m_ += climb_mps * seconds;
+  // Where the sample comes late the wheels have moved the pose over a part of its time.
+  const model::Utime reached = std::clamp(utime_.value_or(from.utime), from.utime, to.utime);
+  const LevelSample middle = interpolate(from, to, reached);
+  if (reached > from.utime) reckoning_.propagate_velocity(from, middle);
+  if (reached == to.utime) return;
+  reckoning_.propagate(reached > from.utime ? middle : from, to);
+  height_m_ += climb_mps * (seconds - seconds_between(from.utime, reached));
 }
 
 void PoseTrack::bridge_gap(model::Utime utime, double yaw_rate_rad_s) {

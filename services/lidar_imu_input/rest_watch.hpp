@@ -2,6 +2,7 @@
 // since.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "common/model/odometry.hpp"
@@ -14,6 +15,8 @@ class RestWatch {
  public:
   /// The vehicle is stationary at `utime`, and has been since `from`.
   void add_stationary(model::Utime from, model::Utime utime);
+  /// The vehicle was stationary until `utime` only.
+  void go_back(model::Utime utime) { until_ = std::min(until_, utime); }
   /// What the attitude's filter knows of the level at the last rest, where a standard deviation has
   /// changed by a tenth since the last call that gave something, and once a second at rest.
   std::optional<model::RestLevel> news(model::Utime utime, const AttitudeFilter& attitude);

@@ -9,7 +9,7 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-constexpr state::Format kFormat{"lidar_imu_input", 14};
+constexpr state::Format kFormat{"lidar_imu_input", 15};
 
 }  // namespace
 

@@ -25,8 +25,6 @@ class StandstillDetector {
   void add_wheel_speed(model::Utime utime, double speed_mps);
   void reset();  ///< Forgets the window, after a gap.
 
-  /// The samples that are looked at, `window_s` long or shorter.
-  const std::deque<model::ImuSample>& window() const { return window_; }
   /// At the latest sample.
   bool is_stationary() const { return is_stationary_; }
   /// For how long without a break, up to the latest sample [s]; 0 while it moves.

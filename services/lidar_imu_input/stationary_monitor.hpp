@@ -35,7 +35,8 @@ class StationaryMonitor {
   /// before. `gyro_bias`: the attitude filter's [rad/s].
   void add(const model::ImuSample& sample, double seconds, const Eigen::Vector3d& gyro_bias,
            const VelocityEvidence& velocity);
-  /// Learns the bias of the heading's rate from the attitude filter. Precondition: is_stationary().
+  /// Learns the bias of the heading's rate from the attitude filter, at rest or as it
+  /// was at the last rest.
   void learn_bias(const AttitudeFilter& attitude);
   /// Takes the speed of the wheels [m/s].
   void add_wheel_speed(model::Utime utime, double speed_mps) {
@@ -52,9 +53,6 @@ class StationaryMonitor {
   bool is_stationary_since(model::Utime utime) const { return moved_utime_ <= utime; }
   /// When it was last found to move.
   model::Utime moved_utime() const { return moved_utime_; }
-  /// The latest samples (frame vehicle), `window_s` long at most. The first 0.2 s of a soft start
-  /// are quiet as well, and count as standing until the motion shows.
-  const std::deque<model::ImuSample>& window() const { return detector_.window(); }
   /// Bias of the heading's rate, from standstills only; its sigma grows while the vehicle moves.
   const YawRateBias& bias() const { return bias_; }
 

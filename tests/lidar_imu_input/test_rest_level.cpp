@@ -136,8 +136,8 @@ TEST_CASE("What is published of the level at rest becomes better, and ends", "[a
     CHECK(level.sequence == i);
     CHECK(level.rest_utime <= level.utime);
 
-    // At rest next to nothing is found, and then and now are the same, but for the noise of the
-    // last tenths of a second: a rest that has just ended is the one before the motion showed.
+    // At rest next to nothing is found. Then and now are the same but for some tenths of a second:
+    // when motion is noticed, the rest is that of before.
     if (level.rest_utime == level.utime) {
       CHECK(level.error_rad.norm() < 2e-4);
       CHECK(level.change_covariance.norm() < 1e-7);

@@ -19,6 +19,12 @@ double arrival_s(const SensorTape::Entry& entry, std::span<const Fault> faults) 
   return entry.at_s;
 }
 
+/// HEALTH is not heard: no pose counts as one that was said to be right.
+SaidPose without_health(SaidPose pose) {
+  pose.is_ok = false;
+  return pose;
+}
+
 /// The messages in the order in which they arrive.
 std::vector<const harness::RawMessage*> arriving(const SensorTape& tape,
                                                  std::span<const Fault> faults) {
@@ -42,10 +48,11 @@ LiveDrive play_in_memory(const SensorTape& tape, std::span<const Fault> faults,
   drive.not_ok.resize(faults.size());
   harness::SensorChain chain(harness::services_of(config_dir), config_dir);
   chain.watch<model::SlamPose>("SLAM_POSE", [&](const model::SlamPose& pose) {
-    if (const auto said = said_pose(pose)) drive.slam.push_back(*said);
+    if (const auto said = said_pose(pose)) drive.slam.push_back(without_health(*said));
   });
-  chain.watch<model::EkfPose>(
-      "EKF_POSE", [&](const model::EkfPose& pose) { drive.filter.push_back(said_pose(pose)); });
+  chain.watch<model::EkfPose>("EKF_POSE", [&](const model::EkfPose& pose) {
+    drive.filter.push_back(without_health(said_pose(pose)));
+  });
 
   for (const harness::RawMessage* message : arriving(tape, faults)) {
     terminal::throw_if_interrupted();

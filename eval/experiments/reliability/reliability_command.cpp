@@ -235,9 +235,10 @@ void add_reliability_experiment(CLI::App& eval) {
       ->check(CLI::Range(250.0, 100000.0))
       ->capture_default_str();
   command.add_option("--only", options->only, "Delays with this in their name");
-  command.add_option("--load", options->load, "Processes beside them that only compute")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
+  CLI::Option* load =
+      command.add_option("--load", options->load, "Processes beside them that only compute")
+          ->check(CLI::Range(0, 256))
+          ->capture_default_str();
   command
       .add_option("--jobs", options->jobs,
                   "Drives at a time: each has a bus of its own and is load for the others")
@@ -248,13 +249,16 @@ void add_reliability_experiment(CLI::App& eval) {
       command.add_flag("--undelayed", options->is_undelayed,
                        "No processes and no delays: the same drives through the stages in one "
                        "process, judged at the same times");
-  command
-      .add_flag("--in-memory", options->is_in_memory,
-                "No processes: the stages in one process get held messages late, and nothing "
-                "stops; the same bytes each time")
-      ->excludes(undelayed);
-  command.add_flag("--supervised", options->live.supervised,
-                   "Under `understory launch`, which restarts what is stopped");
+  CLI::Option* in_memory =
+      command
+          .add_flag("--in-memory", options->is_in_memory,
+                    "No processes: the stages in one process get held messages late, and nothing "
+                    "stops; the same bytes each time")
+          ->excludes(undelayed);
+  CLI::Option* supervised =
+      command.add_flag("--supervised", options->live.supervised,
+                       "Under `understory launch`, which restarts what is stopped");
+  for (CLI::Option* option : {undelayed, in_memory}) option->excludes(load)->excludes(supervised);
   command.add_option("--config", options->live.config_dir, "Configuration of the processes")
       ->capture_default_str();
   command.add_option(
