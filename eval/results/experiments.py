@@ -142,7 +142,7 @@ EXPERIMENTS = (
     _eval("gaps", "gaps --seeds 5 --first-seed 801 --jobs 2", 15),
     _eval("mountings", "mountings --drives 9 --faults 23 --sound-drives 40 --first-seed 1001 --jobs 2", 4),
     _eval("reliability-load-0", f"{RELIABILITY} --drives 28 --jobs 4 --load 0", 28),
-    _eval("reliability-undelayed", f"{RELIABILITY} --drives 4 --jobs 2 --undelayed", 4),
+    _eval("reliability-undelayed", f"{RELIABILITY} --drives 28 --jobs 2 --undelayed", 6),
     _eval("reliability-load-8", f"{RELIABILITY} --drives 2 --load 8", 10),
     _eval("misstated", "misstated --runs 10 --seed 2001", 4),
     _eval("victoria-park", "victoria-park --data DATA", 1, ("victoria_park_raw", "victoria_park_landmark")),

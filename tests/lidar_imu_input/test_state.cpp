@@ -187,6 +187,28 @@ TEST_CASE("a drive that is cut by saving and loading goes on bit by bit as the u
   }
 }
 
+TEST_CASE(
+    "a stage that is saved at the start of motion or while the IMU is late goes on bit by bit",
+    "[state]") {
+  std::vector<Event> events = events_of({});
+  for (const double cut_s : {21.9, 22.05, 22.15, 22.25, 22.4})
+    check_cut(events, index_at(events, cut_s), test::parameters_for_drive());
+
+  // The IMU's samples of four seconds come in one burst at the end of them.
+  const std::size_t from = index_at(events, 26.0);
+  const std::size_t to = index_at(events, 30.0);
+  const auto at = [&events](std::size_t i) {
+    return events.begin() + static_cast<std::ptrdiff_t>(i);
+  };
+  const auto burst = std::stable_partition(at(from), at(to), [](const Event& event) {
+    return !std::holds_alternative<model::ImuSample>(event);
+  });
+  const auto first_late = static_cast<std::size_t>(burst - events.begin());
+  REQUIRE(first_late > from + 150);
+  for (const std::size_t cut : {from + 50, from + 150, first_late, first_late + 300, to})
+    check_cut(events, cut, test::parameters_for_drive());
+}
+
 TEST_CASE("a sweep that waits at the cut is dropped and counted", "[state]") {
   const std::vector<Event> events = events_of({});
   LidarImuInput stage(test::parameters_for_drive());
