@@ -43,7 +43,8 @@ void Levelling::keep_rest(const model::ImuSample& sample) {
   if (rests_.size() <= kRests) return;
 
   rests_.pop_front();
-  while (since_rest_.front().sample.utime < rests_.front().utime) since_rest_.pop_front();
+  while (!since_rest_.empty() && since_rest_.front().sample.utime < rests_.front().utime)
+    since_rest_.pop_front();
 }
 
 std::optional<model::Utime> Levelling::start_moving() {

@@ -48,7 +48,8 @@ class Levelling {
   /// Whether a loaded state keeps the invariant.
   bool is_whole() const {
     const bool has_begun = attitude_.has_value();
-    return has_begun == latest_.has_value() && has_begun == latest_level_.has_value();
+    return has_begun == latest_.has_value() && has_begun == latest_level_.has_value() &&
+           rests_.empty() == since_rest_.empty();
   }
 
   /// For saving and loading: what changes while it runs.

@@ -96,7 +96,7 @@ void MotionEstimator::go_back_to_rest() {
 void MotionEstimator::bridge_gap(const model::ImuSample& sample) {
   levelling_.bridge(seconds_between(levelling_.latest()->utime, sample.utime));
   stationary_.begin_at(sample.utime);
-  // What the wheels measured in the gap is of another velocity than that of now.
+  // The wheel samples of the gap belong to an earlier velocity.
   while (!ahead_.empty() && ahead_.front().utime < sample.utime) ahead_.pop_front();
 
   const double last_rate = levelling_.latest_level()->yaw_rate_rad_s;

@@ -272,6 +272,7 @@ void check_losses(int drives, int draws, std::uint64_t first_seed) {
     const ShortDrive options{.seed = first_seed + static_cast<std::uint64_t>(i), .length_m = 90.0};
     const std::vector<TapeEntry> tape = record(options, &truth);
     const double clean_m = ate_with_losses_m(tape, truth, 0.0, 1);
+
     for (const double drop : {0.01, 0.05, 0.1, 0.2}) {
       for (int draw = 1; draw <= draws; ++draw) {
         const auto seed = static_cast<std::uint64_t>(draw);
@@ -280,6 +281,7 @@ void check_losses(int drives, int draws, std::uint64_t first_seed) {
       }
     }
   }
+
   for (const auto& [drop, of] : ratios) {
     double log_sum = 0.0;
     for (const double ratio : of) log_sum += std::log(ratio);
