@@ -92,6 +92,18 @@ std::optional<RelativeError> relative_error(std::span<const PosePair> poses, dou
   return error;
 }
 
+Eigen::Matrix3d covariance_of_truth(const TruthSigma& sigma,
+                                    const std::optional<SE2>& tie_T_vehicle) {
+  Eigen::Matrix3d of_one = Eigen::Vector3d(sigma.position_m, sigma.position_m, sigma.heading_rad)
+                               .array()
+                               .square()
+                               .matrix()
+                               .asDiagonal();
+  if (!tie_T_vehicle) return of_one;
+  const Eigen::Matrix3d moved = tie_T_vehicle->inverse().Adjoint();
+  return of_one + moved * of_one * moved.transpose();
+}
+
 std::optional<double> nees(const PosePair& pose, const Eigen::Matrix3d& covariance) {
   const Eigen::LLT<Eigen::Matrix3d> root(covariance);
   if (!covariance.allFinite() || root.info() != Eigen::Success) return std::nullopt;

@@ -48,6 +48,18 @@ inline constexpr double kPathTolerance = 0.1;
 /// no such pair. O(n log n).
 std::optional<RelativeError> relative_error(std::span<const PosePair> poses, double length_m);
 
+/// How well the truth is known itself: standard deviations of each of its poses, 0 = exact.
+struct TruthSigma {
+  double position_m = 0.0;  ///< Per axis.
+  double heading_rad = 0.0;
+};
+/// The covariance that the truth's own errors add to that of a pose's error (tangent of the
+/// vehicle; x, y, theta [m, rad]): those of this pose, and those of the true pose to which the map
+/// is tied, moved to here. `tie_T_vehicle`: from that pose to this one; none where the map is tied
+/// by many poses, whose errors average out.
+Eigen::Matrix3d covariance_of_truth(const TruthSigma& sigma,
+                                    const std::optional<SE2>& tie_T_vehicle);
+
 /// Normalised estimation error squared (NEES) of a pose: e^T covariance^-1 e with
 /// e = Log(estimate^-1 * truth), three degrees of freedom. None where the covariance is not
 /// positive definite or not finite (a zero one states nothing).

@@ -5,18 +5,6 @@
 
 namespace understory::cli {
 
-Eigen::Matrix3d covariance_of_truth(const TruthSigma& sigma,
-                                    const std::optional<geometry::SE2>& tie_T_vehicle) {
-  Eigen::Matrix3d of_one = Eigen::Vector3d(sigma.position_m, sigma.position_m, sigma.heading_rad)
-                               .array()
-                               .square()
-                               .matrix()
-                               .asDiagonal();
-  if (!tie_T_vehicle) return of_one;
-  const Eigen::Matrix3d moved = tie_T_vehicle->inverse().Adjoint();
-  return of_one + moved * of_one * moved.transpose();
-}
-
 double ComparedPose::position_error_m() const {
   return (world_T_vehicle.translation() - true_world_T_vehicle.translation()).norm();
 }

@@ -10,18 +10,6 @@
 
 namespace understory::cli {
 
-/// How well the truth is known itself: standard deviations of each of its poses, 0 = exact.
-struct TruthSigma {
-  double position_m = 0.0;  ///< Per axis.
-  double heading_rad = 0.0;
-};
-/// The covariance that the truth's own errors add to that of a pose's error (tangent of the
-/// vehicle; x, y, theta [m, rad]): those of this pose, and those of the true pose to which the map
-/// is tied, moved to here. `tie_T_vehicle`: from that pose to this one; none where the map is tied
-/// by many poses, whose errors average out.
-Eigen::Matrix3d covariance_of_truth(const TruthSigma& sigma,
-                                    const std::optional<geometry::SE2>& tie_T_vehicle);
-
 /// A pose estimate beside the truth of the same instant, frame world.
 struct ComparedPose {
   model::Utime utime = 0;

@@ -136,7 +136,7 @@ std::optional<ComparedPose> DriveAccuracyCollector::compare(
 
   std::optional<geometry::SE2> tie_T_vehicle;
   if (tied.true_world_T_vehicle) tie_T_vehicle = tied.true_world_T_vehicle->inverse() * *truth;
-  pose.covariance += covariance_of_truth(truth_sigma_, tie_T_vehicle);
+  pose.covariance += geometry::covariance_of_truth(truth_sigma_, tie_T_vehicle);
   return pose;
 }
 

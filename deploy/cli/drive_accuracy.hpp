@@ -66,7 +66,8 @@ struct DriveAccuracy {
 class DriveAccuracyCollector {
  public:
   /// `truth_sigma`: how well GROUND_TRUTH is known; covariances of compared poses have it added.
-  explicit DriveAccuracyCollector(const TruthSigma& truth_sigma = {}) : truth_sigma_(truth_sigma) {}
+  explicit DriveAccuracyCollector(const geometry::TruthSigma& truth_sigma = {})
+      : truth_sigma_(truth_sigma) {}
 
   /// Takes one event, in the order of the log; channels that do not matter are only counted.
   void add(const io::LogEvent& event);
@@ -95,7 +96,7 @@ class DriveAccuracyCollector {
   LandmarkAccuracy compare_map(const model::WholeMap& whole,
                                const geometry::SE2& world_T_map) const;
 
-  TruthSigma truth_sigma_;
+  geometry::TruthSigma truth_sigma_;
   TruthTrack truth_;
   truth_landmarks_t true_landmarks_{};
   std::vector<LivePose> poses_;  ///< Localised and coasting ones.

@@ -45,6 +45,14 @@ def _recording(name, source, title, config, minutes, needs):
                  before=(f"understory import {source} --out OUT/{name}.lcm",))
 
 
+def _recorded_walks():
+    """Two recorded walks of stem frames. The standard deviations are those of the recording's true poses (decision 156)."""
+    unpack = ("mkdir -p OUT/recorded-walks",
+              *(f"tar xzf DATA/stem_frames/{walk}.tar.gz -C OUT/recorded-walks" for walk in ("V01", "V02")))
+    return _eval("recorded-walks", "shared-errors --recorded OUT/recorded-walks/V01 OUT/recorded-walks/V02 --truth-sigma-m 0.076 "
+                 "--truth-sigma-deg 0.03 --runs 20 --seed 1 --jobs 2", 10, ("stem_frames",), before=unpack)
+
+
 def _stem_frames():
     """Drives of stem frames through surveyed forests, on which the recogniser was not tuned, and their scores: each
     within itself, and all in one drive of another day. Forests lie 100 km apart, so a drive of one has
@@ -114,7 +122,8 @@ EXPERIMENTS = (
     _loops("loops-strangers", _STRANGE_DRIVES, "--reckon --seed 401", 5),
     _eval("shared-errors", "shared-errors --data DATA --errors shared --seed 1 --jobs 2", 6,
           ("tree_maps", "stem_censuses", "pole_maps")),
-    _eval("few-landmarks", "few-landmarks --seeds 20 --first-seed 101 --config deploy/config/lidar --jobs 2", 2),
+    _recorded_walks(),
+    _eval("few-landmarks", "few-landmarks --seeds 20 --first-seed 101 --config deploy/config/planar --jobs 2", 2),
     _eval("returns", "returns --runs 12 --seed 13100 --jobs 2 --map DATA/tree_maps/longleaf.csv DATA/tree_maps/lansing.csv DATA/tree_maps/bei.csv", 10,
           ("tree_maps",)),
     _eval("loop-detectors", "loop-detectors --queries 250 --cloud-queries 60 --length-m 900 --seed 1 --jobs 2 --data DATA",

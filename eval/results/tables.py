@@ -67,6 +67,7 @@ SECTIONS = (
     ("loops-blind", "Loops found while tracking goes on, no stem seen on a third of the way", None, render_places.loops),
     ("loops-strangers", "Queries that have no match", None, render_places.loop_queries),
     ("shared-errors", "Detections that share errors from frame to frame", None, render_places.shared_errors),
+    ("recorded-walks", "Recorded walks among detected stems", None, render_places.shared_errors),
     ("closures", "Wrong loop closures that agree, and ways to keep them out", None, render_closures.closures),
     ("few-landmarks", "Two or three landmarks in a scan", None, render_places.few_landmarks),
     ("returns", "Drives that drift and come back near themselves", None, render_returns.returns),

@@ -92,7 +92,7 @@ class MadeUpRun {
     send(seconds, "LOG", log);
   }
 
-  std::optional<cli::DriveAccuracy> accuracy(const cli::TruthSigma& truth_sigma = {}) const {
+  std::optional<cli::DriveAccuracy> accuracy(const geometry::TruthSigma& truth_sigma = {}) const {
     cli::DriveAccuracyCollector collector(truth_sigma);
     for (const auto& event : events_) collector.add(event);
     return collector.finish();

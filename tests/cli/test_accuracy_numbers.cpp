@@ -89,7 +89,7 @@ TEST_CASE("ATE, RPE and NEES of a run are those of its errors", "[cli]") {
 
 TEST_CASE("NEES has its expected mean beside a truth whose standard deviations are given",
           "[cli]") {
-  const cli::TruthSigma sigma{0.08, 0.002};
+  const geometry::TruthSigma sigma{0.08, 0.002};
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
   const auto drawn = [&](double position_m, double heading_rad) {

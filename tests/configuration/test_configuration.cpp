@@ -177,9 +177,9 @@ TEST_CASE("the configurations that come with the project start services that the
   CHECK(directories >= 2);
 }
 
-TEST_CASE("the recorded car's mapper uses odometry", "[configuration]") {
+TEST_CASE("the mapper of a car with a one-plane laser uses odometry", "[configuration]") {
   Described described(service_of("geoslam_mapper"));
-  described.table.load(fs::path(UNDERSTORY_SOURCE_CONFIG) / "victoria_park/geoslam_mapper.toml");
+  described.table.load(fs::path(UNDERSTORY_SOURCE_CONFIG) / "planar/geoslam_mapper.toml");
   const auto& entries = described.table.entries();
   const auto use =
       std::ranges::find(entries, "smoothing.use_odometry", &bus::ParameterTable::Entry::key);

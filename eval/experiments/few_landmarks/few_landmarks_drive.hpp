@@ -20,7 +20,7 @@ struct FewLandmarksDrive {
   double rate_hz = 5.0;      ///< Of the laser.
   int walkers = 0;           ///< People beside the path, whom the extractor may take for trunks.
   double wheel_scale = 2.0;  ///< The wheels' errors, by those of sim::WheelParameters.
-  std::filesystem::path config_dir = "deploy/config/lidar";
+  std::filesystem::path config_dir = "deploy/config/planar";
   std::filesystem::path log;  ///< The readings with the truth, as a log; empty = none.
 };
 

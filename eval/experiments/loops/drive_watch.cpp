@@ -91,11 +91,14 @@ void DriveWatch::count_nees(const model::WholeMap& map, const geometry::SE2& map
   std::vector<double> nees;
   for (const model::KeyframePose& keyframe : map.keyframes) {
     const auto frame = frame_at_.find(keyframe.utime);
-    const Eigen::LLT<Eigen::Matrix3d> factor(keyframe.covariance);
-    if (frame == frame_at_.end() || factor.info() != Eigen::Success) continue;
-    const geometry::SE2 truth = map_T_first * drive_.truth[frame->second];
-    const Eigen::Vector3d off = (keyframe.map_T_vehicle.inverse() * truth).Log();
-    nees.push_back(off.dot(factor.solve(off)));
+    const bool is_stated =
+        Eigen::LLT<Eigen::Matrix3d>(keyframe.covariance).info() == Eigen::Success;
+    if (frame == frame_at_.end() || !is_stated) continue;
+    const geometry::PosePair pair{keyframe.map_T_vehicle,
+                                  map_T_first * drive_.truth[frame->second]};
+    // The map is tied at its first keyframe, which is its frame.
+    const Eigen::Matrix3d of_truth = geometry::covariance_of_truth(drive_.truth_sigma, pair.truth);
+    if (const auto one = geometry::nees(pair, keyframe.covariance + of_truth)) nees.push_back(*one);
   }
   fate.nees = mean_of(nees);
   const auto within =

@@ -152,6 +152,7 @@ LoopDrive loop_drive(const std::string& name, const std::vector<model::StemFrame
   if (frames.size() < 2) throw std::invalid_argument(name + ": fewer than two frames");
   LoopDrive drive;
   drive.name = name;
+  drive.truth_sigma = options.truth_sigma;
   add_scans(frames, options, drive);
 
   const geometry::SE2 first_T_world = model::level_pose(frames.front()).inverse();

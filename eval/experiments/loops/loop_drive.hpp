@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "common/geometry/se2.hpp"
+#include "common/geometry/trajectory_error.hpp"
 #include "common/model/landmarks.hpp"
 #include "common/model/odometry.hpp"
 #include "common/model/stem_frame.hpp"
@@ -19,6 +19,7 @@ struct LoopDriveOptions {
   double odometry_deg = 0.3;      ///< Noise of its heading per frame; 1 sigma.
   double sigma_m = 0.1;           ///< That LANDMARKS state, per axis.
   double view_rad = 2.0 * std::numbers::pi;  ///< Width of the field of view, its middle ahead.
+  geometry::TruthSigma truth_sigma;          ///< Of the frames' true poses; for NEES.
   double blind_from = 0.0;  ///< Share of the drive from which on no stem is seen ...
   double blind_to = 0.0;    ///< ... to this.
 };
@@ -29,6 +30,7 @@ struct LoopDrive {
   std::vector<model::LandmarkScan> scans;  ///< One for each frame.
   std::vector<model::Odometry> odometry;   ///< odometry[i]: from frame i to frame i + 1.
   std::vector<geometry::SE2> truth;        ///< first_T_vehicle of each frame.
+  geometry::TruthSigma truth_sigma;        ///< How well it is known.
   /// Which tree each detection is, by frame and detection; -1: none, or not to be told.
   std::vector<std::vector<int>> trees;
   std::size_t tree_count = 0;

@@ -45,12 +45,6 @@ void parse_blind(const std::string& text, LoopDriveOptions& drive) {
         "--blind {}: two shares of the drive, FROM-TO, 0 <= FROM < TO <= 1, are wanted", text));
 }
 
-std::string name_of(const std::string& folder) {
-  std::filesystem::path path(folder);
-  if (path.filename().empty()) path = path.parent_path();
-  return path.filename().string();
-}
-
 nlohmann::json row_of(const LoopDrive& drive, std::uint64_t seed, const LoopScore& score) {
   return {{"drive", drive.name},
           {"run_seed", seed},
@@ -183,6 +177,12 @@ void run_loops(LoopsOptions options) {
 }
 
 }  // namespace
+
+std::string name_of(const std::string& folder) {
+  std::filesystem::path path(folder);
+  if (path.filename().empty()) path = path.parent_path();
+  return path.filename().string();
+}
 
 void add_noise_options(CLI::App& command, LoopDriveOptions& drive) {
   command

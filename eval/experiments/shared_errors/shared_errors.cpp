@@ -4,12 +4,17 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
+#include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <stdexcept>
 
+#include "common/io/stem_frames.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/loops/loop_batch.hpp"
@@ -29,9 +34,13 @@ namespace {
 constexpr double kBandLow = 0.216;
 constexpr double kBandHigh = 9.348;
 
+/// Of a walk that was recorded; simulated ones have the name of their errors.
+constexpr const char* kRecorded = "recorded";
+
 struct SharedErrorsOptions {
-  std::vector<std::string> drives{usual_drives().begin(), usual_drives().end()};
+  std::vector<std::string> drives;
   std::vector<std::string> errors{"shared"};
+  std::vector<std::string> recorded;  ///< Folders of frames.
   std::string data;
   std::string config = "deploy/config/stem_frames";
   loops::LoopDriveOptions inputs;
@@ -80,18 +89,18 @@ nlohmann::json row_of(const loops::LoopDrive& drive, const loops::LoopScore& sco
           {"frame_ms_last_quarter", fate.last_quarter_ms}};
 }
 
-nlohmann::json run_one(const SurveyedDrive& surveyed, const Survey& survey,
-                       const std::string& errors, const SharedErrorsOptions& options,
+/// Frames of one draw of a drive.
+using FramesOf = std::function<std::vector<model::StemFrame>(std::uint64_t seed)>;
+
+nlohmann::json run_one(const std::string& name, const std::string& errors,
+                       const std::vector<model::StemFrame>& frames,
+                       const loops::LoopDriveOptions& inputs, const std::string& config,
                        std::uint64_t seed) {
-  loops::LoopDriveOptions inputs = options.inputs;
-  inputs.view_rad = surveyed.drive.detector.view_rad;
-  const loops::LoopDrive drive = loops::loop_drive(
-      surveyed.name, drive_frames(surveyed, survey, stem_errors(errors).value(), seed), inputs,
-      seed);
-  const loops::LoopScore score = loops::run_drive(drive, options.config, true);
+  const loops::LoopDrive drive = loops::loop_drive(name, frames, inputs, seed);
+  const loops::LoopScore score = loops::run_drive(drive, config, true);
   nlohmann::json row =
       row_of(drive, score, batch_errors(drive, score.first_frame, loops::Association::kTrue));
-  row["drive"] = surveyed.name;
+  row["drive"] = name;
   row["errors"] = errors;
   row["run_seed"] = seed;
   return row;
@@ -140,23 +149,52 @@ void print_reasons(const nlohmann::json& rows) {
     fmt::print("{} closures not accepted at once: {}\n", count, reason);
 }
 
+/// All draws of a drive, printed as one line and put behind `rows`.
+void run_draws(const std::string& name, const std::string& errors, const FramesOf& frames_of,
+               const loops::LoopDriveOptions& inputs, const SharedErrorsOptions& options,
+               const std::atomic<bool>& stop, nlohmann::json& rows) {
+  std::vector<nlohmann::json> of_drive(static_cast<std::size_t>(options.runs));
+  tools::run_in_parallel(of_drive.size(), options.jobs, name, stop, [&](std::size_t i) {
+    const std::uint64_t seed = harness::run_seed(options.seed, static_cast<int>(i));
+    of_drive[i] = run_one(name, errors, frames_of(seed), inputs, options.config, seed);
+  });
+  print_runs(of_drive);
+  for (nlohmann::json& row : of_drive) rows.push_back(std::move(row));
+}
+
+void run_simulated(const std::string& name, const SharedErrorsOptions& options,
+                   const std::atomic<bool>& stop, nlohmann::json& rows) {
+  const SurveyedDrive surveyed = drive_named(name);
+  const Survey survey = read_survey(surveyed, options.data);
+  loops::LoopDriveOptions inputs = options.inputs;
+  inputs.view_rad = surveyed.drive.detector.view_rad;
+  inputs.truth_sigma = {};  // exact
+  for (const std::string& errors : options.errors) {
+    const auto frames_of = [&](std::uint64_t seed) {
+      return drive_frames(surveyed, survey, stem_errors(errors).value(), seed);
+    };
+    run_draws(name, errors, frames_of, inputs, options, stop, rows);
+  }
+}
+
+/// The frames are as they are; the seeds draw the odometry.
+void run_recorded(const std::string& folder, const SharedErrorsOptions& options,
+                  const std::atomic<bool>& stop, nlohmann::json& rows) {
+  const std::vector<model::StemFrame> frames = io::read_stem_frames(folder);
+  run_draws(
+      loops::name_of(folder), kRecorded, [&](std::uint64_t) { return frames; }, options.inputs,
+      options, stop, rows);
+}
+
 void run_shared_errors(const SharedErrorsOptions& options) {
+  if (options.data.empty() && !options.drives.empty())
+    throw std::runtime_error("--data: the simulated drives need the folder of surveyed maps");
+
   const auto& stop = terminal::catch_interrupts();
   nlohmann::json rows = nlohmann::json::array();
   print_heading();
-  for (const std::string& name : options.drives) {
-    const SurveyedDrive surveyed = drive_named(name);
-    const Survey survey = read_survey(surveyed, options.data);
-    for (const std::string& errors : options.errors) {
-      std::vector<nlohmann::json> of_drive(static_cast<std::size_t>(options.runs));
-      tools::run_in_parallel(of_drive.size(), options.jobs, name, stop, [&](std::size_t i) {
-        const std::uint64_t seed = harness::run_seed(options.seed, static_cast<int>(i));
-        of_drive[i] = run_one(surveyed, survey, errors, options, seed);
-      });
-      print_runs(of_drive);
-      for (nlohmann::json& row : of_drive) rows.push_back(std::move(row));
-    }
-  }
+  for (const std::string& name : options.drives) run_simulated(name, options, stop, rows);
+  for (const std::string& folder : options.recorded) run_recorded(folder, options, stop, rows);
   print_reasons(rows);
   if (options.json.empty()) return;
 
@@ -165,7 +203,9 @@ void run_shared_errors(const SharedErrorsOptions& options) {
                               {"config", options.config},
                               {"odometry_percent", options.inputs.odometry_percent},
                               {"odometry_deg", options.inputs.odometry_deg},
-                              {"sigma_m", options.inputs.sigma_m}};
+                              {"sigma_m", options.inputs.sigma_m},
+                              {"truth_sigma_m", options.inputs.truth_sigma.position_m},
+                              {"truth_sigma_rad", options.inputs.truth_sigma.heading_rad}};
   harness::write_json(options.json, harness::result_document("shared-errors", config, rows));
 }
 
@@ -177,12 +217,27 @@ void add_shared_errors_experiment(CLI::App& eval) {
                            "Drives whose detections share errors from frame to frame: error, "
                            "consistency, closures and time beside the batch solution");
   const auto options = std::make_shared<SharedErrorsOptions>();
-  command.add_option("--data", options->data, "Folder of recordings, with the surveyed maps")
-      ->required();
+  command.add_option("--data", options->data, "Folder of recordings, with the surveyed maps");
   command
-      .add_option("--drive", options->drives,
-                  "Which drives; beside the six there is longleaf-few, two or three stems a frame")
+      .add_option(
+          "--drive", options->drives,
+          "Which simulated drives; default six, none with --recorded. Beside the six there is "
+          "longleaf-few, two or three stems a frame")
       ->delimiter(',');
+  command
+      .add_option("--recorded", options->recorded,
+                  "Folders of recorded frames (frame_<n>.csv, trajectory.txt); runs draw the "
+                  "odometry")
+      ->check(CLI::ExistingDirectory);
+  command
+      .add_option("--truth-sigma-m", options->inputs.truth_sigma.position_m,
+                  "Standard deviation of recorded true positions, per axis; for NEES")
+      ->check(CLI::Range(0.0, 100.0));
+  const auto truth_sigma_deg = std::make_shared<double>(0.0);
+  command
+      .add_option("--truth-sigma-deg", *truth_sigma_deg,
+                  "Standard deviation of recorded true headings; for NEES")
+      ->check(CLI::Range(0.0, 90.0));
   command
       .add_option(
           "--errors", options->errors,
@@ -202,8 +257,12 @@ void add_shared_errors_experiment(CLI::App& eval) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command.add_option("--json", options->json, "Result document");
-  command.callback(
-      [options] { run_guarded("shared-errors", [options] { run_shared_errors(*options); }); });
+  command.callback([options, truth_sigma_deg] {
+    options->inputs.truth_sigma.heading_rad = *truth_sigma_deg * std::numbers::pi / 180.0;
+    if (options->drives.empty() && options->recorded.empty())
+      options->drives.assign(usual_drives().begin(), usual_drives().end());
+    run_guarded("shared-errors", [options] { run_shared_errors(*options); });
+  });
 }
 
 }  // namespace understory::eval::experiments::shared_errors
