@@ -23,24 +23,29 @@ constexpr double kBehind_m = 260.0;  ///< and go on.
 constexpr double kEnd_m = 340.0;
 constexpr int kKeyframes = static_cast<int>(kEnd_m / kStep_m);
 
-/// Straight on among trees that are at least 3 m apart.
+/// Straight on among trees.
 class Road {
  public:
-  explicit Road(std::uint64_t seed) : random_(seed) {
+  explicit Road(std::uint64_t seed, std::size_t trees = 150, double apart_m = 3.0,
+                double edge_m = 0.0)
+      : random_(seed) {
     std::uniform_real_distribution<double> along(-kRange_m, kEnd_m + kRange_m);
     std::uniform_real_distribution<double> across(-15.0, 15.0);
-    while (trees_m_.size() < 150) {
+    while (trees_m_.size() < trees) {
       const Eigen::Vector2d tree_m(along(random_), across(random_));
-      const bool is_near = std::ranges::any_of(
-          trees_m_, [&](const Eigen::Vector2d& other) { return (other - tree_m).norm() < 3.0; });
-      if (!is_near && (tree_m.x() < kGap_m || tree_m.x() > kBehind_m)) trees_m_.push_back(tree_m);
+      const bool is_near = std::ranges::any_of(trees_m_, [&](const Eigen::Vector2d& other) {
+        return (other - tree_m).norm() < apart_m;
+      });
+      const bool is_wood = tree_m.x() < kGap_m || tree_m.x() > kBehind_m + edge_m;
+      if (!is_near && is_wood) trees_m_.push_back(tree_m);
     }
   }
 
-  std::vector<model::MapLandmark> given(double from_m) {
+  /// Of the trees from there on, this share.
+  std::vector<model::MapLandmark> given(double from_m, double share = 1.0) {
     std::vector<model::MapLandmark> result;
     for (const Eigen::Vector2d& tree_m : trees_m_) {
-      if (tree_m.x() < from_m) continue;
+      if (tree_m.x() < from_m || (share < 1.0 && uniform_(random_) >= share)) continue;
       model::MapLandmark one;
       one.id = (std::uint64_t{7} << 48U) + result.size() + 1;
       one.position_m = tree_m + 0.02 * Eigen::Vector2d(draw(), draw());
@@ -50,8 +55,9 @@ class Road {
     }
     return result;
   }
-  model::Odometry odometry(int i) {
-    return test::simple_odometry(i, kStep_m, {0.02, 0.01, 3e-3}, {draw(), draw(), draw()});
+  model::Odometry odometry(int i, double heading_sigma_rad = 3e-3) {
+    return test::simple_odometry(i, kStep_m, {0.02, 0.01, heading_sigma_rad},
+                                 {draw(), draw(), draw()});
   }
   model::Keyframe keyframe(int i) {
     model::Keyframe keyframe = test::simple_keyframe(i, kRange_m);
@@ -63,6 +69,7 @@ class Road {
     }
     return keyframe;
   }
+  void plant(const Eigen::Vector2d& tree_m) { trees_m_.push_back(tree_m); }
   static Eigen::Vector2d position_m(int i) { return {kStep_m * i, 0.0}; }
   std::size_t size() const { return trees_m_.size(); }
 
@@ -71,6 +78,7 @@ class Road {
 
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
+  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
   std::vector<Eigen::Vector2d> trees_m_;
 };
 
@@ -100,6 +108,38 @@ TEST_CASE("Behind a gap the map that a drive began in is met again, and not doub
     CHECK((last.map_T_vehicle.translation() - Road::position_m(kKeyframes - 1)).norm() < 0.1);
   }
   CHECK(doubles <= 3);  // Of 3,000 trees.
+}
+
+TEST_CASE("Behind a gap one tree beside those of the given map does not tie the drive to them",
+          "[given_map]") {
+  // The map has a clump of trees at the edge. They were felled, and one stands between them.
+  const Eigen::Vector2d clump_m(kBehind_m + 5.0, 5.0);
+  std::size_t landmarks = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    CAPTURE(seed);
+    Road road(seed, 400, 1.0, 40.0);
+    std::vector<model::MapLandmark> given = road.given(-kRange_m);
+    for (int i = 0; i < 49; ++i) {
+      model::MapLandmark felled = given.back();
+      ++felled.id;
+      felled.position_m = clump_m + 0.4 * Eigen::Vector2d(i % 7 - 3, i / 7 - 3);
+      given.push_back(felled);
+    }
+    for (model::MapLandmark& one : given) one.covariance_m2 = 2.5e-3 * Eigen::Matrix2d::Identity();
+    road.plant(clump_m + Eigen::Vector2d(0.2, 0.2));
+
+    SmoothingMapper mapper(with_odometry());
+    mapper.start_with(given);
+    model::MapUpdate last;
+    for (int i = 0; i < kKeyframes; ++i) {
+      if (i > 0) mapper.add(road.odometry(i, 1e-3));
+      last = mapper.add(road.keyframe(i));
+    }
+    const Eigen::Vector2d end_m = last.map_T_vehicle.translation();
+    CHECK((end_m - Road::position_m(kKeyframes - 1)).norm() < 0.1);
+    landmarks += mapper.landmarks().size() - given.size();
+  }
+  CHECK(landmarks <= 80);  // One in each drive is new.
 }
 
 TEST_CASE("Behind a gap a given map that was joined is met again, and not doubled", "[rejoining]") {

@@ -42,10 +42,11 @@ struct Given {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
 };
 
-/// Takes those of the pairs that no keyframe saw yet into the graph.
+/// Takes those of the pairs that no keyframe saw yet into the graph; gives those that stay.
 std::vector<Given> enter_given(const std::vector<MergedPair>& pairs, GlobalMap& map) {
   std::vector<Given> given;
   for (const auto& [old_id, new_id] : pairs) {
+    if (map.landmarks.at(old_id).is_given_unseen()) map.enter_given(old_id);
     if (!map.landmarks.at(new_id).is_given_unseen()) continue;
     map.enter_given(new_id);
     given.push_back({new_id, map.landmarks.at(new_id).position_m});

@@ -113,6 +113,8 @@ Scene scene_around(const model::FieldOfView& field_of_view, NodeIndex node, cons
     const bool is_given = pass.is_given && landmark.is_given_unseen();
     if (!is_given && !map.graph.position(id) && !map.graph.is_dormant(id)) continue;
     if (is_seen_around(node, kAnotherPass_m, landmark, map.graph)) {
+      // Two of one given map are two.
+      if (pass.is_given && landmark.is_given()) continue;
       const double distance_m = (landmark.position_m - map_T_node.translation()).norm();
       if (distance_m < range_m) ours.emplace_back(distance_m, id);
     } else if (pass.is_given || is_seen_around(*pass.node, kOnePass_m, landmark, map.graph)) {

@@ -38,12 +38,13 @@ constexpr double kNarrowGiven_m = 1.0;
 
 /// Whether the gate of a landmark that does not share the reference's error is so wide that another
 /// one may be meant. All of a pass are off together then.
-bool is_loose(const StoredLandmark& landmark, double gate_m,
+bool is_loose(const StoredLandmark& landmark, double gate_m, double gate_of_vehicle_m,
               const std::optional<Reference>& reference, int recent_keyframes,
               const Trajectory& trajectory) {
-  const double narrow_m = landmark.nodes.empty() ? kNarrowGiven_m : kNarrow_m;
-  return gate_m > narrow_m &&
-         !(reference && is_recent(landmark, *reference, recent_keyframes, trajectory));
+  const bool is_wide = landmark.nodes.empty()
+                           ? gate_m > kNarrowGiven_m || gate_of_vehicle_m > kNarrow_m
+                           : gate_m > kNarrow_m;
+  return is_wide && !(reference && is_recent(landmark, *reference, recent_keyframes, trajectory));
 }
 
 /// The last keyframe; none where the map has none.
@@ -111,9 +112,12 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
   std::vector<model::LandmarkId> loose;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const StoredLandmark& landmark = map.landmarks.at(ids[i]);
-    const double gate_m =
-        parameters_.gate_sigmas * std::sqrt(variances[i]) + parameters_.gate_floor_m;
-    if (is_loose(landmark, gate_m, relative_to, parameters_.recent_keyframes, map.trajectory)) {
+    const auto gate_m = [&](double variance_m2) {
+      return parameters_.gate_sigmas * std::sqrt(variance_m2) + parameters_.gate_floor_m;
+    };
+    const double of_vehicle_m2 = std::max(0.0, variances[i] - landmark.local_variance());
+    if (is_loose(landmark, gate_m(variances[i]), gate_m(of_vehicle_m2), relative_to,
+                 parameters_.recent_keyframes, map.trajectory)) {
       loose.push_back(ids[i]);
       continue;
     }

@@ -1,9 +1,11 @@
 #include "eval/experiments/existence/census/census_run.hpp"
 
+#include <fmt/format.h>
 #include <toml++/toml.h>
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <random>
 #include <set>
 #include <string>
@@ -11,11 +13,13 @@
 
 #include "common/bus/config_layers.hpp"
 #include "common/bus/launch_config.hpp"
+#include "common/io/lcm_log.hpp"
 #include "common/wire/convert.hpp"
 #include "eval/experiments/existence/census/census_drive.hpp"
 #include "eval/experiments/existence/census/landmark_stems.hpp"
 #include "eval/harness/drive_map.hpp"
 #include "sim/hash_random.hpp"
+#include "understory/ground_truth_t.hpp"
 
 namespace understory::eval::experiments::existence::census {
 namespace {
@@ -49,25 +53,60 @@ std::map<std::string, std::string> census_parameters(const CensusOptions& option
           {kTracker, bus::layer_over(bus::config_file_in(options.config_dir, kTracker), tracker)}};
 }
 
+/// Keeps what goes into the processes, and the truth.
+class Recorder {
+ public:
+  /// An empty path: keeps nothing.
+  explicit Recorder(const std::filesystem::path& file) {
+    if (!file.empty()) writer_.emplace(file);
+  }
+  void add(model::Utime utime, const char* channel, const wire::Bytes& bytes) {
+    if (writer_) writer_->write(utime, channel, bytes);
+  }
+  void add_truth(model::Utime utime, const geometry::SE2& world_T_vehicle) {
+    ground_truth_t truth{};
+    truth.seq = truths_++;
+    truth.utime = utime;
+    truth.world_T_vehicle = wire::to_wire(world_T_vehicle);
+    add(utime, "GROUND_TRUTH", wire::encode_message(truth));
+  }
+  void finish() {
+    if (writer_) writer_->commit();
+  }
+
+ private:
+  std::optional<io::LcmLogWriter> writer_;
+  std::int64_t truths_ = 0;
+};
+
 /// One drive through the processes.
 harness::ChainRun drive_processes(CensusDrive& drive, const CensusOptions& options,
-                                  const std::filesystem::path& map, std::size_t places,
+                                  const std::filesystem::path& map,
+                                  const std::filesystem::path& log,
                                   const std::vector<geometry::SE2>& path, LandmarkStems& names,
                                   const std::function<void(double)>& progress) {
+  Recorder recorder(log);
   harness::ChainRun run;
   harness::SensorChain chain(services_from_landmarks(options.config_dir), options.config_dir,
                              census_parameters(options, map));
   harness::watch_chain(chain, run);
   names.begin_drive();
   for (std::size_t i = 0; const auto scan = drive.next(options.forest.range_m); ++i) {
-    if (scan->odometry) chain.feed("ODOMETRY", wire::encode_message(*scan->odometry));
-    if (options.use_ranges) chain.feed("VIEW_RANGES", wire::encode_message(scan->view));
-    names.add(scan->landmarks.utime, scan->stems);
-    run.truth.push_back({scan->landmarks.utime, path[i]});
-    chain.feed("LANDMARKS", wire::encode_message(scan->landmarks));
-    if (i % 1000 == 0) progress(static_cast<double>(i) / static_cast<double>(places));
+    const model::Utime utime = scan->landmarks.utime;
+    const auto feed = [&](const char* channel, const wire::Bytes& bytes) {
+      recorder.add(utime, channel, bytes);
+      chain.feed(channel, bytes);
+    };
+    names.add(utime, scan->stems);
+    run.truth.push_back({utime, path[i]});
+    recorder.add_truth(utime, path[i]);
+    if (scan->odometry) feed("ODOMETRY", wire::encode_message(*scan->odometry));
+    if (options.use_ranges) feed("VIEW_RANGES", wire::encode_message(scan->view));
+    feed("LANDMARKS", wire::encode_message(scan->landmarks));
+    if (i % 1000 == 0) progress(static_cast<double>(i) / static_cast<double>(path.size()));
   }
   harness::finish_chain(chain, run);
+  recorder.finish();
   for (const model::MapUpdate& update : run.updates) names.count(update);
   return run;
 }
@@ -156,8 +195,13 @@ CensusRun run_census(const std::vector<CensusStem>& stems, const CensusOptions& 
     CensusDrive drive(looks, path, static_cast<model::Utime>(1e6 * (1.0 + time_s)),
                       census_errors(options.share_errors), seed,
                       sim::mixed(seed, static_cast<std::uint64_t>(k)), random);
+    const auto kept = [&](const char* ending) {
+      return options.logs.empty()
+                 ? std::filesystem::path()
+                 : options.logs / fmt::format("seed-{}-drive-{}{}", seed, k, ending);
+    };
     harness::ChainRun run =
-        drive_processes(drive, options, map, path.size(), path, names,
+        drive_processes(drive, options, map, kept(".lcm"), path, names,
                         [&](double done) { progress((k + done) / (setting.drives + 1)); });
 
     if (k == 0) {
@@ -173,6 +217,7 @@ CensusRun run_census(const std::vector<CensusStem>& stems, const CensusOptions& 
       for (model::MapLandmark& landmark : run.landmarks) landmark.covariance_m2.setZero();
     map = scratch / ("drive-" + std::to_string(k) + ".gpkg");
     harness::write_drive_map(run, "census", map);
+    if (!options.logs.empty()) std::filesystem::copy_file(map, kept(".gpkg"));
   }
   return result;
 }

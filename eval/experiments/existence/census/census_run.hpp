@@ -23,6 +23,8 @@ struct CensusOptions {
   /// far end), and the next drive takes that for an error of each by itself. Else it states
   /// nothing, and `smoothing.given_map_sigma_m` counts.
   bool state_covariances = false;
+  /// Folder that keeps the inputs of each drive as a log, and the map after it; empty: none.
+  std::filesystem::path logs;
 };
 
 /// A stem of the first map, after a drive.

@@ -253,6 +253,8 @@ void add_existence_census_experiment(CLI::App& eval) {
       ->capture_default_str();
   command.add_option("--pass-m", options->census.pass_m, "looks.pass_m instead of the configured")
       ->check(CLI::Range(1.0, 1e6));
+  command.add_option("--logs", options->census.logs,
+                     "Folder for the inputs of each drive, as logs, and the maps");
   command.add_flag("--state-covariances", options->census.state_covariances,
                    "The map file has the covariances of MAP");
   command.add_option("--config", options->census.config_dir, "Configuration folder of the chain")
