@@ -199,7 +199,6 @@ plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
   return result;
 }
 
-/// Whether the node's landmarks must follow it; they do then.
 /// The landmark is no more among the node's dormant ones.
 void PoseGraph::wakes(NodeIndex node, model::LandmarkId id) {
   const auto found = dormant_of_node_.find(node);
@@ -207,6 +206,7 @@ void PoseGraph::wakes(NodeIndex node, model::LandmarkId id) {
   if (found->second.landmarks.empty()) dormant_of_node_.erase(found);
 }
 
+/// Whether the node's landmarks must follow it; they do then.
 bool PoseGraph::has_left(NodeIndex node) {
   const auto found = dormant_of_node_.find(node);
   if (found == dormant_of_node_.end()) return false;

@@ -196,7 +196,7 @@ class PoseGraph {
   /// map_T_centre of a node.
   geometry::SE2 pose(NodeIndex node) const { return smoother_.pose(nodes_[node].centre); }
   /// Largest move of a node [m] that its dormant landmarks do not follow at once.
-  static constexpr double kDormantMove_m = 0.02;
+  static constexpr double kDormantMove_m = 0.05;
 
   /// Position of a landmark [m]; none while it is not in the graph.
   std::optional<Eigen::Vector2d> position(model::LandmarkId id) const;
