@@ -11,7 +11,11 @@ namespace {
 
 constexpr std::size_t kMostLogLines = 500;
 constexpr std::size_t kMostScanPoints = 20'000;
+/// Poses that come slower than 3 Hz are silent after so many of their intervals, but not later than
+/// kLatestSilence_us.
 constexpr std::int64_t kSilentPose_us = 1'000'000;
+constexpr double kSilentIntervals = 3.0;
+constexpr std::int64_t kLatestSilence_us = 10'000'000;
 constexpr std::int64_t kAgePeriod_us = 10'000'000;
 constexpr double kSigmas = 3.0;    ///< Of what is told to people.
 constexpr double kUnsure_m = 1.0;  ///< A standard deviation above it is said to be unsure.
@@ -26,6 +30,14 @@ double largest_sigma_m(const Eigen::Matrix3d& covariance) {
 }
 
 bool has_place(const model::SlamPose& pose) { return pose.is_localised() || pose.is_coasting; }
+
+/// How long no pose may come, by how many come usually.
+std::int64_t silent_after_us(std::optional<double> rate_hz) {
+  if (!rate_hz) return kSilentPose_us;
+  const double usual_us = kSilentIntervals * 1e6 / *rate_hz;
+  return std::clamp(static_cast<std::int64_t>(std::min(usual_us, 1e12)), kSilentPose_us,
+                    kLatestSilence_us);
+}
 
 /// Of the numbers of slam_pose2_t: whether a path is drawn the same at both.
 bool is_same_line(std::uint8_t a, std::uint8_t b) { return (a == 6) == (b == 6); }
@@ -91,6 +103,9 @@ void Scene::start_map(std::uint32_t map_id) {
   changed(true_pose_).reset();
   alignment_.clear();
   world_T_map_.reset();
+  SceneNumbers& numbers = changed(numbers_);
+  numbers.error_m = numbers.error_rad = numbers.nees = std::nullopt;
+  numbers.is_too_sure = false;
   reset_change_ = ++change_;
 }
 
@@ -111,6 +126,8 @@ void Scene::take(const model::SlamPose& pose, std::int64_t wall_us) {
 
   // How often poses come, and how late.
   SceneNumbers& numbers = changed(numbers_);
+  if (!pose_times_us_.empty() && wall_us - pose_times_us_.back() > kLatestSilence_us)
+    pose_times_us_.clear();  // A gap says nothing of how often poses come.
   pose_times_us_.push_back(wall_us);
   while (pose_times_us_.size() > 2 && wall_us - pose_times_us_.front() > 3'000'000)
     pose_times_us_.pop_front();
@@ -187,6 +204,12 @@ void Scene::judge(const model::SlamPose& pose) {
     set_verdict(State::kUnsure,
                 fmt::format("localised, but only to \u00b1{:.1f} m", kSigmas * sigma_m),
                 pose.utime);
+  } else if (numbers_.value.is_too_sure && numbers_.value.nees) {
+    set_verdict(
+        State::kUnsure,
+        fmt::format("\u00b1{:.2f} m is too small: NEES {:.0f} against ground truth, bound {:.1f}",
+                    kSigmas * sigma_m, *numbers_.value.nees, kNeesBound),
+        pose.utime);
   } else {
     set_verdict(State::kOk, fmt::format("localised, \u00b1{:.2f} m", kSigmas * sigma_m),
                 pose.utime);
@@ -195,7 +218,8 @@ void Scene::judge(const model::SlamPose& pose) {
 
 void Scene::look(std::int64_t wall_us) {
   processes_.look(wall_us);
-  if (pose_wall_us_ == 0 || wall_us - pose_wall_us_ <= kSilentPose_us) return;
+  if (pose_wall_us_ == 0 || wall_us - pose_wall_us_ <= silent_after_us(numbers_.value.rate_hz))
+    return;
   set_verdict(Verdict::State::kSilent, "no pose comes any more", utime_);
   if (numbers_.value.rate_hz) changed(numbers_).rate_hz.reset();
 }

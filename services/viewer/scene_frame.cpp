@@ -122,19 +122,33 @@ void add_scan(const Scene& scene, const FrameRequest& request, nlohmann::ordered
   writer.add("detection_kind", std::span<const std::uint8_t>(kinds));
 }
 
+/// Where the page holds a landmark that a keyframe should see; none where nobody expects that: the
+/// landmark is taken for gone.
+std::optional<Slot> slot_in_use(const LandmarkTable& table, model::LandmarkId id) {
+  const auto slot = table.slot_of(id);
+  if (slot && (table.slots()[*slot].flags & SceneLandmark::kOutOfUse) != 0) return std::nullopt;
+  return slot;
+}
+
 void add_matches(const Scene& scene, nlohmann::ordered_json& header, FrameWriter& writer) {
   const model::MapUpdate& update = scene.matches().value.update;
-  header["matches"] = matches_json(update);
+  const LandmarkTable& table = scene.landmarks();
   std::vector<std::uint32_t> matched;
-  std::vector<std::uint32_t> expected;
+  std::vector<std::uint32_t> unseen;
+  std::size_t seen = 0;
   for (const model::Association& one : update.associations) {
-    if (const auto slot = scene.landmarks().slot_of(one.landmark_id)) matched.push_back(*slot);
+    if (const auto slot = table.slot_of(one.landmark_id)) matched.push_back(*slot);
+    const bool is_new = std::ranges::find(update.added, one.landmark_id) != update.added.end();
+    if (!is_new && slot_in_use(table, one.landmark_id)) ++seen;
   }
   for (const model::ExpectedLandmark& one : update.expected) {
-    if (const auto slot = scene.landmarks().slot_of(one.id)) expected.push_back(*slot);
+    if (one.sight == model::LineOfSight::kBlocked) continue;
+    if (const auto slot = slot_in_use(table, one.id)) unseen.push_back(*slot);
   }
+  header["matches"] = matches_json(update);
+  header["matches"]["expected"] = seen + unseen.size();
   writer.add("match_slot", std::span<const std::uint32_t>(matched));
-  writer.add("expected_slot", std::span<const std::uint32_t>(expected));
+  writer.add("unseen_slot", std::span<const std::uint32_t>(unseen));
 }
 
 void add_hierarchy(const Scene& scene, nlohmann::ordered_json& header, FrameWriter& writer) {

@@ -9,6 +9,9 @@ namespace {
 
 constexpr double kTruthEvery_m = 0.2;
 constexpr double kRedraw_m = 0.05;
+/// Of chi^2 with the 3 degrees of freedom of a pose, its 99.9 %: above it the covariance is said to
+/// be too small, until NEES is below kNeesBound again.
+constexpr double kTooSureNees = 16.3;
 
 }  // namespace
 
@@ -64,6 +67,8 @@ void Scene::compare_with_truth(const model::SlamPose& pose) {
   numbers.error_rad = std::abs(error.z());
   const Eigen::LLT<Eigen::Matrix3d> factor(pose.covariance);
   if (factor.info() == Eigen::Success) numbers.nees = error.dot(factor.solve(error));
+  if (numbers.nees)
+    numbers.is_too_sure = *numbers.nees > (numbers.is_too_sure ? kNeesBound : kTooSureNees);
 
   // The path so far: drawn anew when the alignment has moved it by more than is seen.
   const auto in_map = [&](const std::pair<model::Utime, geometry::SE2>& one) {

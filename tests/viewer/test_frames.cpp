@@ -1,4 +1,5 @@
 #include <random>
+#include <set>
 
 #include "services/viewer/page_clients.hpp"
 #include "tests/catch.hpp"
@@ -174,6 +175,40 @@ TEST_CASE("frames in pieces, whenever they come, give what the scene has", "[vie
     check_same(page, scene);
   }
   CHECK(scene.change() > 1000);
+}
+
+TEST_CASE("a cross is a landmark in use that nothing hid, and the count is that of the crosses",
+          "[viewer]") {
+  Scene scene;
+  model::MapDelta delta;
+  delta.version = 1;
+  for (model::LandmarkId id = 1; id <= 8; ++id) delta.added.push_back(landmark(id, 1.0, 0.0));
+  scene.take(delta);
+  model::Existence existence;
+  for (const model::LandmarkId id : {6, 7}) existence.landmarks.push_back({id, 0.01, false});
+  scene.take(existence);
+
+  model::MapUpdate update;
+  update.status = model::MapUpdateStatus::kUpdated;
+  for (const model::LandmarkId id : {1, 2, 6, 8})
+    update.associations.push_back({.landmark_id = id});
+  update.added = {8};
+  update.expected = {{.id = 3, .sight = model::LineOfSight::kUnknown},
+                     {.id = 4, .sight = model::LineOfSight::kClear},
+                     {.id = 5, .sight = model::LineOfSight::kBlocked},
+                     {.id = 7, .sight = model::LineOfSight::kClear}};
+  scene.take(update);
+
+  viewer::SceneCursor cursor;
+  const test::PageFrame frame(*viewer::make_frame(scene, {}, {}, cursor));
+  std::set<std::uint64_t> crosses;
+  const auto ids = frame.array<std::uint32_t>("id_low");
+  for (const std::uint32_t slot : frame.array<std::uint32_t>("unseen_slot"))
+    crosses.insert(ids.at(slot));
+  CHECK(crosses == std::set<std::uint64_t>{3, 4});
+  CHECK(frame.array<std::uint32_t>("match_slot").size() == 4);
+  // 1 and 2 were seen, 3 and 4 were not; 6 is out of use, 8 is new.
+  CHECK(frame.header.at("matches").at("expected") == 4);
 }
 
 TEST_CASE("a page that does not acknowledge gets two frames, then what it missed", "[viewer]") {

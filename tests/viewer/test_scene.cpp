@@ -202,6 +202,61 @@ TEST_CASE("truth is tied where the map begins", "[viewer]") {
   CHECK(*scene.numbers().value.error_rad == Approx(0.001).margin(1e-4));
 }
 
+TEST_CASE("a pose that is farther from ground truth than it says is not ok", "[viewer]") {
+  Scene scene;
+  scene.take_truth(0, geometry::SE2());
+  model::MapUpdate first;
+  first.status = model::MapUpdateStatus::kFirstMap;
+  scene.take(first);
+  // The standard deviation of a pose is 0.01 m.
+  model::Utime utime = 0;
+  const auto state_at = [&](double error_m) {
+    utime += 100'000;
+    scene.take_truth(utime, geometry::SE2(1e-6 * static_cast<double>(utime), error_m, 0.0));
+    scene.take(pose(utime, 1e-6 * static_cast<double>(utime)), utime);
+    return scene.verdict().value.state;
+  };
+  CHECK(state_at(0.02) == Verdict::State::kOk);
+  CHECK(state_at(0.04) == Verdict::State::kOk);  // NEES 16.0: one in a thousand.
+  CHECK(state_at(0.06) == Verdict::State::kUnsure);
+  CHECK_THAT(scene.verdict().value.text, Contains("\u00b10.03 m is too small: NEES 36"));
+
+  // It ends within the bounds that the page draws.
+  CHECK(state_at(0.035) == Verdict::State::kUnsure);
+  CHECK(state_at(0.03) == Verdict::State::kOk);
+
+  // In another map nothing is known of it.
+  CHECK(state_at(0.06) == Verdict::State::kUnsure);
+  model::SlamPose other = pose(utime + 100'000);
+  other.map_id = 2;
+  scene.take(other, utime + 100'000);
+  CHECK(scene.verdict().value.state == Verdict::State::kOk);
+  CHECK_FALSE(scene.numbers().value.nees);
+}
+
+TEST_CASE("poses that come slowly are silent when they are late", "[viewer]") {
+  constexpr std::int64_t kSecond_us = 1'000'000;
+  Scene scene;
+  for (int i = 1; i <= 4; ++i) scene.take(pose(3 * kSecond_us * i), 3 * kSecond_us * i);
+  scene.look(20 * kSecond_us);
+  CHECK(scene.verdict().value.state == Verdict::State::kOk);
+  scene.look(22 * kSecond_us);
+  CHECK(scene.verdict().value.state == Verdict::State::kSilent);
+
+  // A gap does not say how often they come.
+  scene.take(pose(500 * kSecond_us), 500 * kSecond_us);
+  scene.look(500 * kSecond_us + 900'000);
+  CHECK(scene.verdict().value.state == Verdict::State::kOk);
+  scene.look(502 * kSecond_us);
+  CHECK(scene.verdict().value.state == Verdict::State::kSilent);
+
+  // None that is slower than one in 3.3 s is waited for longer than 10 s.
+  for (int i = 0; i < 3; ++i)
+    scene.take(pose((600 + 8 * i) * kSecond_us), (600 + 8 * i) * kSecond_us);
+  scene.look(627 * kSecond_us);
+  CHECK(scene.verdict().value.state == Verdict::State::kSilent);
+}
+
 TEST_CASE("a map that begins is drawn from its first pose on, whatever its number", "[viewer]") {
   const std::uint32_t second = GENERATE(1U, 2U);
   Scene scene;

@@ -17,6 +17,10 @@ export function expose(app: App): void {
     fit: () => app.tools.fit(),
     screenOf: (x: number, y: number) => app.map.camera.toScreen(x, y),
     redraw: () => app.redraw(),
+    palette: () => {
+      const { likely, unknown, added, removed } = app.theme.palette;
+      return { likely, unknown, added, removed };
+    },
   };
   (window as unknown as { understory: typeof api }).understory = api;
 }

@@ -17,7 +17,7 @@ export type VerdictState = "waiting" | "ok" | "unsure" | "lost" | "silent";
 export interface Verdict { state: VerdictState; text: string; since_utime: number }
 export interface Planar { x: number; y: number; theta: number }
 export interface Range { first: number; total: number }
-export interface Matches extends Planar { keyframe_seq: number; status: string; reason: string }
+export interface Matches extends Planar { keyframe_seq: number; status: string; reason: string; expected: number }
 export interface Submap extends Planar { id: number; outline: [number, number][] }
 export interface Closure {
   id: number; source: string; status: string; reason: string; from: [number, number]; to: [number, number];

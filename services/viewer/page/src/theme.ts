@@ -19,14 +19,14 @@ const dark: Palette = {
   background: rgb("#0e1311"), gridMinor: rgb("#171e1b"), gridMajor: rgb("#232c28"), ink: rgb("#e8eeea"), muted: rgb("#87958d"),
   accent: rgb("#3fd0a0"), runs: [rgb("#3fd0a0"), rgb("#c8a6ff")], truth: rgb("#d7dedA"), unknown: rgb("#8a948e"),
   unlikely: rgb("#ffb000"), doubtful: rgb("#e8478c"), likely: rgb("#6a9bff"), warn: rgb("#f5b942"), bad: rgb("#ff5d55"),
-  added: rgb("#4fb3ff"), removed: rgb("#ff8a4c"), scan: rgb("#b6c4bc"), hierarchy: [rgb("#3a4f6b"), rgb("#8f7bd6")],
+  added: rgb("#4fdc8f"), removed: rgb("#ff5d55"), scan: rgb("#b6c4bc"), hierarchy: [rgb("#3a4f6b"), rgb("#8f7bd6")],
   submap: rgb("#6f8a7c"), detection: rgb("#ffffff"),
 };
 const light: Palette = {
   background: rgb("#f8f9f6"), gridMinor: rgb("#eff1ec"), gridMajor: rgb("#dfe3dc"), ink: rgb("#17201b"), muted: rgb("#6a766f"),
   accent: rgb("#07795a"), runs: [rgb("#07795a"), rgb("#7a3fd0")], truth: rgb("#2a332e"), unknown: rgb("#98a19b"),
   unlikely: rgb("#e68a00"), doubtful: rgb("#c9246b"), likely: rgb("#2458c9"), warn: rgb("#b87400"), bad: rgb("#c8201b"),
-  added: rgb("#0b66c3"), removed: rgb("#d2500f"), scan: rgb("#5c6a62"), hierarchy: [rgb("#b9c8dc"), rgb("#7a62c9")],
+  added: rgb("#07795a"), removed: rgb("#c8201b"), scan: rgb("#5c6a62"), hierarchy: [rgb("#b9c8dc"), rgb("#7a62c9")],
   submap: rgb("#7f9488"), detection: rgb("#17201b"),
 };
 

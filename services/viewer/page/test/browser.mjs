@@ -52,6 +52,25 @@ export async function colours(page) {
   }, png.toString("base64"));
 }
 
+/** Of the pixels of the map, the share in a colour of landmarks, by its name in the palette; a pixel at an edge is none. */
+export async function paints(page) {
+  const png = await page.locator('[data-test="map"]').screenshot();
+  return page.evaluate(async (data) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${data}`;
+    await image.decode();
+    const g = new OffscreenCanvas(image.width, image.height).getContext("2d");
+    g.drawImage(image, 0, 0);
+    const pixels = g.getImageData(0, 0, image.width, image.height).data, palette = window.understory.palette(), shares = {};
+    for (const [name, colour] of Object.entries(palette)) {
+      let n = 0;
+      for (let i = 0; i < pixels.length; i += 4) if (colour.every((c, k) => Math.abs(pixels[i + k] - 255 * c) < 14)) n++;
+      shares[name] = n / (pixels.length / 4);
+    }
+    return { shares, palette: JSON.stringify(palette) };
+  }, png.toString("base64"));
+}
+
 export function must(condition, text) {
   if (!condition) throw new Error(text);
 }

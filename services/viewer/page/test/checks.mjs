@@ -1,5 +1,5 @@
 // What must hold of the page. A check takes {browser, serve} and returns what it measured, in words.
-import { colours, must, open, pictures, state, stats, text, until } from "./browser.mjs";
+import { colours, must, open, paints, pictures, state, stats, text, until } from "./browser.mjs";
 
 export const checks = {
   "the page opens, the map appears, numbers move": async ({ browser, serve }) => {
@@ -122,6 +122,33 @@ export const checks = {
     await until("another difference", async () => { const s = await state(page); return s.revision.base === 1 && s.difference.added !== before.added; });
     must((await state(page)).verdict.word === "STORED MAP", "a stored map has no verdict");
     return JSON.stringify((await state(page)).difference);
+  },
+
+  "a stored map shows how probable its landmarks are, and what one version alone has": async ({ browser, serve }) => {
+    const server = await serve("map"), page = await open(browser, server.url), { palette } = await paints(page);
+    const share = async () => (await paints(page)).shares;
+    await page.locator('[data-test="base-4"]').check();
+    await until("no difference", async () => { const s = await state(page); return s.revision.base === 4 && s.difference.added + s.difference.removed === 0; });
+    await page.waitForTimeout(300);
+    const same = await share();
+    must(same.likely > 2 * same.unknown, `without a difference the map is grey: ${JSON.stringify(same)}`);
+    must(same.added === 0 && same.removed === 0, `nothing differs, and it is drawn: ${JSON.stringify(same)}`);
+    await page.locator('[data-test="base-1"]').check();
+    await until("a difference", async () => { const s = await state(page); return s.revision.base === 1 && s.difference.added > 0 && s.difference.removed > 0; });
+    await page.waitForTimeout(300);
+    const other = await share();
+    must(other.added > 0 && other.removed > 0, `a difference is not drawn in ${palette}: ${JSON.stringify(other)}`);
+    must(other.likely > 2 * other.unknown, `with a difference the map is grey: ${JSON.stringify(other)}`);
+    return JSON.stringify(other);
+  },
+
+  "the count of what was expected and not seen is that of the crosses": async ({ browser, serve }) => {
+    const server = await serve("drive"), page = await open(browser, server.url);
+    await pictures(page, 5);
+    const world = server.scene.worlds[0], told = () => `${world.expected.length} of ${world.matched.length + world.expected.length}`;
+    const { value } = await until("the count of the crosses", async () => { const shown = await text(page, "number-unseen"); return shown === told() && world.expected.length > 0 && shown; }, 10_000);
+    must(/need.window_m/.test(await page.locator('.number:has([data-test="number-missing"])').getAttribute("title")), "the share of the map does not say of which path it is");
+    return value;
   },
 
   "a message that is none does no harm": async ({ browser, serve }) => {

@@ -2,7 +2,7 @@
 // in and near the view are drawn, with the ellipses of their covariance.
 import * as THREE from "three";
 import type { Palette, Rgb } from "../theme";
-import { blockSize, outOfUse, there, type Landmarks } from "../store/landmarks";
+import { blockSize, onlyHere, outOfUse, there, type Landmarks } from "../store/landmarks";
 import { contains, type Camera, type Rect } from "./camera";
 import type { Ellipses } from "./ellipses";
 import { addMesh, material, uColour } from "./gl";
@@ -13,39 +13,48 @@ const perPicture = 48;
 const vertex = `
 in vec4 landmark;
 uniform float uLeast; uniform vec3 uUnknown; uniform vec3 uUnlikely; uniform vec3 uDoubtful; uniform vec3 uLikely;
-uniform vec3 uAdded; uniform vec4 uTint; uniform float uCompare;
+uniform vec3 uOnly; uniform vec4 uTint; uniform highp int uCompare;
 flat out vec4 vColour; flat out float vSize; flat out int vFlags;
 void main() {
   int flags = int(landmark.w * 0.5); float p = landmark.w - 2.0 * float(flags);
+  bool isOnlyHere = (flags & 16) != 0;
   vFlags = flags;
   vec3 c = p > 1.25 ? uUnknown : p < 0.5 ? mix(uUnlikely, uDoubtful, 2.0 * p) : mix(uDoubtful, uLikely, 2.0 * p - 1.0);
   c = mix(c, uTint.rgb, uTint.a);
-  float alpha = 1.0;
-  if (uCompare > 0.0) { bool isOnlyHere = (flags & 16) != 0; c = isOnlyHere ? uAdded : uUnknown; alpha = isOnlyHere ? 1.0 : 0.45; }
-  vColour = vec4(c, alpha);
+  if (uCompare > 0 && isOnlyHere) c = uOnly;
+  vColour = vec4(c, 1.0);
   float size = max(uLeast * uScreen.w, 2.0 * landmark.z * uScreen.z);
-  if (uCompare > 0.0 && (flags & 16) != 0) size = max(size, 5.0 * uScreen.w);
+  if (uCompare > 0 && isOnlyHere) size = max(size, 11.0 * uScreen.w);
   vSize = min(size, 400.0);
   gl_PointSize = vSize + 2.0;
-  gl_Position = (flags & 1) == 0 ? vec4(2.0, 2.0, 2.0, 1.0) : fromPixel(toPixel(landmark.xy));
+  bool isShown = (flags & 1) != 0 && (uCompare < 2 || isOnlyHere);
+  gl_Position = isShown ? fromPixel(toPixel(landmark.xy)) : vec4(2.0, 2.0, 2.0, 1.0);
 }`;
 const fragment = `
 flat in vec4 vColour; flat in float vSize; flat in int vFlags;
+uniform highp int uCompare;
 void main() {
-  vec2 p = (gl_PointCoord - 0.5) * (vSize + 2.0);
-  float r = 0.5 * vSize, d = (vFlags & 2) != 0 ? max(abs(p.x), abs(p.y)) - 0.9 * r : length(p) - r;
+  vec2 p = (gl_PointCoord - 0.5) * (vSize + 2.0), q = abs(p);
+  float r = 0.5 * vSize, d = (vFlags & 2) != 0 ? max(q.x, q.y) - 0.9 * r : length(p) - r;
+  bool isOnlyHere = uCompare > 0 && (vFlags & 16) != 0;
+  if (isOnlyHere) {
+    // A plus, or a cross; with an edge as wide as a third of it at most.
+    if (uCompare > 1) q = abs(vec2(p.x + p.y, p.x - p.y)) * 0.7071;
+    d = max(min(q.x, q.y) - min(1.2 * uScreen.w, r / 3.0), max(q.x, q.y) - r);
+  }
   float alpha = clamp(0.5 - d, 0.0, 1.0);
-  if ((vFlags & 4) != 0 && r > 2.0) alpha *= clamp(d + 1.6 * uScreen.w, 0.0, 1.0);
-  else if ((vFlags & 4) != 0) alpha *= 0.5;
+  bool isHollow = !isOnlyHere && (vFlags & 4) != 0;
+  if (isHollow) alpha *= r > 2.0 ? clamp(d + 1.6 * uScreen.w, 0.0, 1.0) : 0.5;
   if (alpha < 0.01) discard;
   colour = vec4(vColour.rgb, vColour.a * alpha);
 }`;
 
-export interface LandmarkStyle { compare: Rgb | null; tint: Rgb | null }
+/** `only`: of two versions of a map, the colour of what the other one lacks, a plus here and a cross in the base, of which nothing else is drawn. */
+export interface LandmarkStyle { only: Rgb | null; isBase: boolean; tint: Rgb | null }
 
 export class LandmarkLayer {
   private readonly uniforms = {
-    uLeast: { value: 4 }, uUnknown: uColour(), uUnlikely: uColour(), uDoubtful: uColour(), uLikely: uColour(), uAdded: uColour(),
+    uLeast: { value: 4 }, uUnknown: uColour(), uUnlikely: uColour(), uDoubtful: uColour(), uLikely: uColour(), uOnly: uColour(),
     uTint: { value: new THREE.Vector4() }, uCompare: { value: 0 },
   };
   private readonly shader = material(vertex, fragment, this.uniforms);
@@ -62,7 +71,7 @@ export class LandmarkLayer {
   /** Not all of what changed is on the GPU yet: another picture is needed. */
   isBehind = false;
   private palette!: Palette;
-  private tint: Rgb | null = null;
+  private style: LandmarkStyle = { only: null, isBase: false, tint: null };
 
   constructor(scene: THREE.Scene, order: number, private readonly ellipses: Ellipses) {
     addMesh(scene, this.all, order);
@@ -76,12 +85,12 @@ export class LandmarkLayer {
     u.uUnlikely.value.set(...p.unlikely);
     u.uDoubtful.value.set(...p.doubtful);
     u.uLikely.value.set(...p.likely);
-    u.uCompare.value = style.compare ? 1 : 0;
-    if (style.compare) u.uAdded.value.set(...style.compare);
+    u.uCompare.value = style.only ? (style.isBase ? 2 : 1) : 0;
+    if (style.only) u.uOnly.value.set(...style.only);
     if (style.tint) u.uTint.value.set(...style.tint, 0.85);
     else u.uTint.value.set(0, 0, 0, 0);
     this.palette = p;
-    this.tint = style.tint ?? style.compare;
+    this.style = style;
     this.area = null;
   }
 
@@ -159,8 +168,10 @@ export class LandmarkLayer {
     const xx = l.covariance[3 * s], xy = l.covariance[3 * s + 1], yy = l.covariance[3 * s + 2];
     // Smaller than this it has faded out at twice the scale, too, when the next choice is made.
     if (!(l.flags[s] & there) || !(Math.max(xx, yy) * scale * scale > 0.25)) return;
+    const { only, isBase, tint } = this.style, isOnlyHere = only !== null && (l.flags[s] & onlyHere) !== 0;
+    if (isBase && only && !isOnlyHere) return;
     const p = l.probability[s], q = this.palette;
-    const c = this.tint ?? (Number.isNaN(p) ? q.unknown : p < 0.35 ? q.unlikely : p < 0.75 ? q.doubtful : q.likely);
+    const c = (isOnlyHere ? only : tint) ?? (Number.isNaN(p) ? q.unknown : p < 0.35 ? q.unlikely : p < 0.75 ? q.doubtful : q.likely);
     this.ellipses.ellipse(l.drawn[4 * s], l.drawn[4 * s + 1], xx, xy, yy, c, l.flags[s] & outOfUse ? 0.4 : 0.75);
   }
 }

@@ -49,8 +49,8 @@ export class MapView {
     this.renderer.setClearColor(new THREE.Color().setRGB(...p.background, THREE.LinearSRGBColorSpace));
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.gridLayer.paint(p);
-    this.landmarks[0].paint(p, { compare: isMap && this.store.other ? p.added : null, tint: null });
-    this.landmarks[1].paint(p, { compare: isMap ? p.removed : null, tint: isMap ? null : p.runs[1] });
+    this.landmarks[0].paint(p, { only: isMap && this.store.other ? p.added : null, isBase: false, tint: null });
+    this.landmarks[1].paint(p, { only: isMap ? p.removed : null, isBase: true, tint: isMap ? null : p.runs[1] });
     this.paths.forEach((l, i) => l.paint(p, { colour: p.runs[i], alpha: 0.95, width: 2.6, dash: 0 }));
     this.truthPath.paint(p, { colour: p.truth, alpha: 0.55, width: 1.4, dash: 4 });
     this.keyframes.paint(p, { colour: p.ink, alpha: 0.5, width: 1.2, dash: 0 });

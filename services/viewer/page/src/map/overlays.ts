@@ -73,7 +73,7 @@ export class Overlays {
     const m = run.matches, d = run.landmarks.drawn;
     if (!m) return;
     for (const s of run.matchSlots) this.above.line(m.x, m.y, d[4 * s], d[4 * s + 1], p.runs[run.index % 2], 0.45, 1.2);
-    for (const s of run.expectedSlots) {
+    for (const s of run.unseenSlots) {
       this.above.line(m.x, m.y, d[4 * s], d[4 * s + 1], p.bad, 0.4, 1, 3);
       this.marks.mark(shape.cross, d[4 * s], d[4 * s + 1], 7, 0.3, p.bad);
     }

@@ -100,15 +100,17 @@ export class MapTools {
   }
 
   private updateLegend(): void {
-    const isMap = this.store.hello?.mode === "map", names = this.map.shownRuns().map((r) => r.name);
-    const key = `${isMap} ${names}`;
+    const isMap = this.store.hello?.mode === "map", names = this.map.shownRuns().map((r) => r.name), revision = this.store.main?.revision;
+    const isCompared = isMap && names.length > 1 && revision?.version !== revision?.base;
+    const key = `${isMap} ${isCompared} ${names}`;
     if (key === this.legendOf) return;
     this.legendOf = key;
     const entry = (css: string, text: string) => h("span", { class: "legend-entry" }, h("i", { class: css }), text);
     const runs = names.length > 1 && !isMap ? names.map((n, i) => entry(`line run-${i}`, n)) : [];
-    const marks = isMap ? [entry("dot added", "only in this version"), entry("dot removed", "only in the base"), entry("dot unknown", "in both")]
-      : [h("span", { class: "legend-entry" }, "exists: 0", h("i", { class: "ramp" }), "1"), entry("dot unknown", "unknown"), entry("dot hollow", "out of use")];
-    this.legend.replaceChildren(...runs, ...marks);
+    const sign = (css: string, text: string, what: string) => h("span", { class: "legend-entry" }, h("b", { class: css }, text), what);
+    const versions = isCompared ? [sign("added", "+", "only in this version"), sign("removed", "\u00d7", "only in the base")] : [];
+    const marks = [h("span", { class: "legend-entry" }, "exists: 0", h("i", { class: "ramp" }), "1"), entry("dot unknown", "unknown"), entry("dot hollow", "out of use")];
+    this.legend.replaceChildren(...runs, ...versions, ...marks);
   }
 
   private button(name: string, title: string, act: () => void): HTMLButtonElement {

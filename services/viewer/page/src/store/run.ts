@@ -29,7 +29,7 @@ export class Run {
   detections: Detections = { x: noFloats, y: noFloats, radius: noFloats, kind: noBytes };
   matches: P.Matches | null = null;
   matchSlots: Uint32Array = noSlots;
-  expectedSlots: Uint32Array = noSlots;
+  unseenSlots: Uint32Array = noSlots;
   hierarchy: Hierarchy = { a: noSlots, b: noSlots, level: noBytes };
   submaps: P.Submap[] = [];
   closures: P.Closure[] = [];
@@ -90,7 +90,7 @@ export class Run {
     if (frame.matches !== undefined) {
       this.matches = frame.matches;
       this.matchSlots = slots(a.match_slot);
-      this.expectedSlots = slots(a.expected_slot);
+      this.unseenSlots = slots(a.unseen_slot);
       this.version.matches++;
     }
   }
@@ -134,7 +134,7 @@ export class Run {
     this.pose = this.truth = this.matches = null;
     this.scan = { x: noFloats, y: noFloats, z: noFloats };
     this.detections = { x: noFloats, y: noFloats, radius: noFloats, kind: noBytes };
-    this.matchSlots = this.expectedSlots = noSlots;
+    this.matchSlots = this.unseenSlots = noSlots;
     this.hierarchy = { a: noSlots, b: noSlots, level: noBytes };
     this.submaps = [];
     this.closures = [];

@@ -30,9 +30,9 @@ export function pose(w) {
 
 export function seen(w) {
   const { x, y, z, d } = w.scan();
-  return [{ scan: { utime: w.utime }, matches: { keyframe_seq: w.keyframes.x.length, status: "localised", reason: "", ...w.keyframePose } }, {
+  return [{ scan: { utime: w.utime }, matches: { keyframe_seq: w.keyframes.x.length, status: "localised", reason: "", ...w.keyframePose, expected: w.matched.length + w.expected.length } }, {
     scan_x: f32(x), scan_y: f32(y), scan_z: f32(z), detection_x: f32(d.x), detection_y: f32(d.y), detection_radius: f32(d.radius), detection_kind: Uint8Array.from(d.kind),
-    match_slot: u32(w.matched), expected_slot: u32(w.expected),
+    match_slot: u32(w.matched), unseen_slot: u32(w.expected),
   }];
 }
 
