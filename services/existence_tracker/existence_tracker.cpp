@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "services/existence_tracker/seen_landmarks.hpp"
+
 namespace understory::existence_tracker {
 namespace {
 
@@ -75,6 +77,7 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
   for (auto& [id, tracked] : points_) changed_.push_back(id);
   unused_ = unused;
   begins_drive_ = true;
+  need_.know(points_.size());
 }
 
 void ExistenceTracker::pass_time(model::Utime utime, TrackedPoint& tracked) const {
@@ -107,9 +110,8 @@ std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& up
   std::vector<model::LandmarkId> added = update.added;
   std::ranges::sort(added);
   for (const model::LandmarkId id : added) births_.push_back({id, vehicle_m, update.utime});
-  for (const model::Association& pair : update.associations)
-    if (!std::ranges::binary_search(added, pair.landmark_id))
-      look(pair.landmark_id, true, existence::Ray::kUnknown, update);
+  for (const model::LandmarkId id : seen_landmarks(update))
+    if (!std::ranges::binary_search(added, id)) look(id, true, existence::Ray::kUnknown, update);
 
   const bool knows_where =
       update.inliers >= static_cast<std::uint32_t>(parameters_.looks.min_inliers);
@@ -152,6 +154,7 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   look->goes_on = goes_on(tracked, update.utime);
   if (!look->goes_on) {
     count_false(tracked);
+    if (tracked.is_first_pass) need_.know(1);
     tracked.is_first_pass = tracked.has_just_left = false;
   }
   if (is_hit) {
@@ -209,6 +212,7 @@ TrackedPoint& ExistenceTracker::known(model::LandmarkId id, model::Utime utime) 
   if (!is_new) return found->second;
   begin(id, found->second);
   // It was in the map before this drive.
+  need_.know(1);
   found->second.told_probability = found->second.point.probability();
   return found->second;
 }
@@ -311,10 +315,10 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
   existence.unused = unused_;
   // Beyond what drives have missed, not what this one misses.
   const double usual = model_.learned().before;
-  existence.missing_share = need_.missing_share(usual > 0.0 ? usual : model_.recall().of_pass());
+  const double recall = usual > 0.0 ? usual : model_.recall().of_pass();
+  existence.missing_share = need_.missing_share(recall);
   existence.new_share = need_.new_share();
-  existence.is_mapping_needed =
-      existence.missing_share + existence.new_share > parameters_.need.changed_above;
+  existence.is_mapping_needed = need_.is_needed(recall);
 
   for (const model::LandmarkId id : ids_to_tell()) {
     TrackedPoint& tracked = points_.at(id);

@@ -10,6 +10,15 @@ constexpr int kLooks = 3;
 
 }  // namespace
 
+void MappingNeed::know(std::size_t landmarks) {
+  if (!has_map()) std::erase_if(seen_, [](const auto& entry) { return !entry.second.is_old; });
+  known_ += landmarks;
+}
+
+bool MappingNeed::has_map() const {
+  return known_ >= static_cast<std::uint64_t>(parameters_.min_landmarks);
+}
+
 void MappingNeed::look_for(model::LandmarkId id, bool is_hit, double probability, double along_m) {
   Looked& one = seen_.try_emplace(id, Looked{along_m, probability, 0, false, true}).first->second;
   one.along_m = along_m;
@@ -44,6 +53,10 @@ double MappingNeed::missing_share(double recall) const {
   }
   if (looked_for < parameters_.min_landmarks || there <= 0.0) return 0.0;
   return std::clamp(1.0 - (1.0 - missed / there) / std::max(0.05, recall), 0.0, 1.0);
+}
+
+bool MappingNeed::is_needed(double recall) const {
+  return has_map() && missing_share(recall) + new_share() > parameters_.changed_above;
 }
 
 double MappingNeed::new_share() const {

@@ -19,6 +19,10 @@ class MappingNeed {
   /// Nothing was driven. `parameters` gives all but the threshold.
   explicit MappingNeed(const NeedParameters& parameters = {}) : parameters_(parameters) {}
 
+  /// So many more landmarks are known of earlier passes: with `min_landmarks` of them there is a
+  /// map that can have changed. On a first drive there is none, and mapping goes on anyhow. Until
+  /// there is one, what the window has as new is of the earlier pass.
+  void know(std::size_t landmarks);
   /// A look at a landmark that the map had, at this path of the vehicle [m]; `probability` that it
   /// existed before the look. One that the window saw as new stays new.
   void look_for(model::LandmarkId id, bool is_hit, double probability, double along_m);
@@ -34,10 +38,14 @@ class MappingNeed {
   /// Of the landmarks that were seen, those that are new to the map; 0 to 1. Likewise.
   double new_share() const;
 
+  /// Whether a map of earlier drives has changed so much that it should be mapped again; `recall`
+  /// as for missing_share().
+  bool is_needed(double recall) const;
+
   /// Members of a saved state; see common/state. Parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.seen_);
+    a(self.seen_, self.known_);
   }
 
  private:
@@ -53,8 +61,11 @@ class MappingNeed {
       a(s.along_m, s.probability, s.looks, s.was_hit, s.is_old);
     }
   };
+  bool has_map() const;
+
   NeedParameters parameters_;
   std::map<model::LandmarkId, Looked> seen_;
+  std::uint64_t known_ = 0;  ///< Landmarks of earlier passes.
 };
 
 }  // namespace understory::existence_tracker

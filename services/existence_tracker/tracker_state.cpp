@@ -9,7 +9,7 @@
 namespace understory::existence_tracker {
 namespace {
 
-constexpr state::Format kFormat{"existence_tracker", 6};
+constexpr state::Format kFormat{"existence_tracker", 7};
 
 }  // namespace
 

@@ -40,6 +40,27 @@ TEST_CASE("Shares of what is missing and of what is new", "[existence]") {
   CHECK(need.new_share() == 0.0);
 }
 
+TEST_CASE("A map of earlier passes can have changed, a first drive asks for nothing",
+          "[existence]") {
+  MappingNeed need;
+  see_new(need, 201, 60, 1.0);
+  CHECK(need.new_share() == 1.0);
+  CHECK_FALSE(need.is_needed(1.0));
+
+  // With the tenth landmark of an earlier pass there is a map; what was new before it is of that.
+  need.know(9);
+  see_new(need, 201, 60, 1.0);
+  CHECK_FALSE(need.is_needed(1.0));
+  need.know(1);
+  CHECK_FALSE(need.is_needed(1.0));
+  see_new(need, 201, 60, 1.0);
+  CHECK(need.is_needed(1.0));
+  need.know(1);
+  CHECK(need.is_needed(1.0));
+  look_for(need, 1, 300, true, 0.99);
+  CHECK_FALSE(need.is_needed(1.0));
+}
+
 TEST_CASE("What may be false is as little missing and new as it is probable", "[existence]") {
   MappingNeed need;
   look_for(need, 1, 30, true, 0.9);

@@ -50,6 +50,29 @@ TEST_CASE("The mapper does not use what is gone, and uses it again when it is ba
   CHECK(stack.map.landmarks.size() <= landmarks + 1);
 }
 
+TEST_CASE("A first lap asks for no mapping, a lap through another forest does", "[existence]") {
+  Forest forest(3);
+  Stack stack;
+  double most_new = 0.0;
+  std::size_t asked = 0;
+  const auto drive_lap = [&](Forest& driven, int lap) {
+    for (int k = lap * kLap; k < (lap + 1) * kLap; ++k) {
+      stack.drive(driven, k, k + 1, {});
+      most_new = std::max(most_new, stack.last.new_share);
+      asked += stack.last.is_mapping_needed ? 1 : 0;
+    }
+  };
+  drive_lap(forest, 0);
+  CHECK(most_new > 0.9);
+  CHECK(asked == 0);
+  drive_lap(forest, 1);
+  CHECK(asked == 0);
+
+  const std::set<std::size_t> felled = forest.felled(0.6);
+  stack.drive(forest, 2 * kLap, 3 * kLap, {.gone = felled});
+  CHECK(stack.last.is_mapping_needed);
+}
+
 TEST_CASE("What lorries hide stays where the sensor has ranges, what is gone leaves use",
           "[existence]") {
   Forest forest(5);

@@ -299,6 +299,24 @@ TEST_CASE("Merged, removed and unknown landmarks", "[existence]") {
   CHECK_FALSE(tracker.add(update));
 }
 
+TEST_CASE("A landmark that a keyframe sees and merges is the one that lives on", "[existence]") {
+  Road road(13, 20);
+  ExistenceTracker tracker(for_road());
+  tracker.take(road.map());
+  const auto updates = road.drive(0, [&](model::LandmarkId) { return true; });
+  for (const model::MapUpdate& update : updates) tracker.add(update);
+
+  model::MapUpdate update = updates.back();
+  update.expected.clear();
+  update.associations = {{0, 3}, {1, 4}, {2, 6}};
+  update.merged = {{6, 3}, {3, 4}};
+  const std::uint64_t hits = tracker.counters().hits;
+  tracker.add(update);
+  CHECK_FALSE(tracker.of(3));
+  CHECK_FALSE(tracker.of(6));
+  CHECK(tracker.counters().hits == hits + 1);
+}
+
 TEST_CASE("A false landmark of this drive leaves use when nobody sees it again", "[existence]") {
   Road road(14);
   ExistenceTracker tracker(for_road());
