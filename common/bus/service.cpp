@@ -2,6 +2,8 @@
 
 #include <sstream>
 
+#include "common/model/program_version.hpp"
+
 namespace understory::bus {
 namespace {
 
@@ -37,10 +39,7 @@ void describe(RuntimeParameters& parameters, ParameterTable& table) {
       "came late, until a quarter of that is left.");
 }
 
-#ifndef UNDERSTORY_VERSION
-#error "UNDERSTORY_VERSION comes from CMake"
-#endif
-std::string program_version() { return UNDERSTORY_VERSION; }
+std::string program_version() { return model::program_version(); }
 
 NodeOptions node_options(const std::string& process, const RuntimeParameters& parameters) {
   NodeOptions options;

@@ -149,6 +149,7 @@ void DriveFile::begin(std::uint32_t map_id, model::Utime utime) {
       .bind(drive_key::kOpen)
       .run();
   set_meta(*connection_, drive_key::kNewest, std::max(newest().value_or(utime), utime));
+  state_program(*connection_);
   connection_
       ->prepare(
           "INSERT OR IGNORE INTO understory_maps (map_id, name, created_utime, origin, checksum) "

@@ -183,6 +183,7 @@ std::uint64_t Recording::write(const ChangeNote& note) {
             std::string_view(note.text), Blob(bytes), static_cast<std::int64_t>(size),
             std::string_view(checksum))
       .run();
+  state_program(connection_);
   return number;
 }
 

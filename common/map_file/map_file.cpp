@@ -146,6 +146,8 @@ std::optional<model::MapReference> MapFile::reference() const {
 
 std::vector<Change> MapFile::history() const { return changes_in(*connection_); }
 
+std::string MapFile::program_version() const { return program_of(*connection_); }
+
 std::vector<std::string> MapFile::check() const { return findings_in(*connection_); }
 
 std::uint64_t MapFile::put(std::span<const StoredMap> maps, const ChangeNote& note) {

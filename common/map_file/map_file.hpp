@@ -72,6 +72,8 @@ class MapFile {
   std::optional<model::MapReference> reference() const;
   /// All changes, the oldest first.
   std::vector<Change> history() const;
+  /// The version of Understory that wrote it last; empty where an older one did, which stated none.
+  std::string program_version() const;
   /// All that is wrong with it, a line each: pages and indexes of SQLite, tables and rows that a
   /// GeoPackage must have, values, checksums of maps and of changes. O(size).
   std::vector<std::string> check() const;

@@ -7,6 +7,7 @@
 #include "common/map_file/reference_rows.hpp"
 #include "common/map_file/sql_text.hpp"
 #include "common/map_file/submap_tables.hpp"
+#include "common/model/program_version.hpp"
 
 namespace understory::map_file {
 namespace {
@@ -253,6 +254,7 @@ void state_version(const Connection& connection) {
   connection.prepare("INSERT OR REPLACE INTO understory_meta VALUES ('schema_version', ?1)")
       .bind(std::string_view(std::to_string(kSchemaVersion)))
       .run();
+  state_program(connection);
 }
 
 /// Those of the layers' indexes, in place of what is there.
@@ -341,6 +343,18 @@ void create_schema(const Connection& connection) {
 std::int64_t schema_version(const Connection& connection) {
   return std::stoll(
       connection.text("SELECT value FROM understory_meta WHERE key = 'schema_version'"));
+}
+
+void state_program(const Connection& connection) {
+  connection.prepare("INSERT OR REPLACE INTO understory_meta VALUES ('program_version', ?1)")
+      .bind(std::string_view(model::program_version()))
+      .run();
+}
+
+std::string program_of(const Connection& connection) {
+  Statement row =
+      connection.prepare("SELECT value FROM understory_meta WHERE key = 'program_version'");
+  return row.step() ? row.text(0) : std::string();
 }
 
 void upgrade_schema(const Connection& connection) {

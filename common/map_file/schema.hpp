@@ -70,6 +70,11 @@ std::int64_t schema_version(const Connection& connection);
 /// where it is one.
 void upgrade_schema(const Connection& connection);
 
+/// States that this version of the program wrote the file last; for people, no reader goes by it.
+void state_program(const Connection& connection);
+/// The version that the file states so; empty in files of before that was stated.
+std::string program_of(const Connection& connection);
+
 /// The rectangles, times of change and reference systems that gpkg_contents states. `utime` [us].
 void refresh_contents(const Connection& connection, model::Utime utime);
 

@@ -111,8 +111,8 @@ void doctor(const DoctorOptions& options) {
   look_at_bus(options.lcm_url, bus);
   findings.insert(findings.begin(), bus.begin(), bus.end());
 
-  fmt::print("{}",
-             options.json ? dumped(findings_json(findings), 2) + "\n" : findings_text(findings));
+  fmt::print("{}", options.json ? result_text(findings_json(findings), 2) + "\n"
+                                : findings_text(findings));
   const std::size_t bad = bad_ones(findings);
   if (bad > 0) fail(fmt::format("doctor: {} to be mended", bad));
 }

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/io/lcm_log.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/wire/convert.hpp"
+#include "deploy/cli/original_log.hpp"
 
 namespace understory::cli {
 
@@ -19,7 +19,7 @@ namespace understory::cli {
 class BagLog {
  public:
   /// Throws LogError when the file cannot be created.
-  explicit BagLog(const std::string& file) : writer_(file) {}
+  explicit BagLog(const std::string& file) : writer_(file, "understory import") {}
 
   /// Adds a message that is complete at `due`.
   template <class Message>
@@ -88,7 +88,7 @@ class BagLog {
     waiting_.erase(first);
   }
 
-  io::LcmLogWriter writer_;
+  OriginalLog writer_;
   std::multimap<Key, Event> waiting_;
   std::map<std::string, std::uint64_t> counts_;
   std::uint64_t sweeps_ = 0;

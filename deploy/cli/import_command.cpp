@@ -6,7 +6,6 @@
 #include <string>
 
 #include "common/io/data_error.hpp"
-#include "common/io/lcm_log.hpp"
 #include "common/io/victoria_park.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
@@ -19,6 +18,7 @@
 #include "deploy/cli/import_packets.hpp"
 #include "deploy/cli/import_sensors.hpp"
 #include "deploy/cli/import_stem_frames.hpp"
+#include "deploy/cli/original_log.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
 
 namespace understory::cli {
@@ -35,7 +35,7 @@ struct VictoriaParkImportOptions {
 class Importer {
  public:
   /// `raw`: what the sensors gave, for lidar_imu_input; else what it makes of that.
-  Importer(const io::VictoriaPark& recording, io::LcmLogWriter& writer, bool raw)
+  Importer(const io::VictoriaPark& recording, OriginalLog& writer, bool raw)
       : recording_(recording), writer_(writer), odometry_(parameters()), raw_(raw) {}
 
   void run() {
@@ -85,7 +85,7 @@ class Importer {
   }
 
   const io::VictoriaPark& recording_;
-  io::LcmLogWriter& writer_;
+  OriginalLog& writer_;
   lidar_imu_input::WheelOdometry odometry_;
   bool raw_;
   std::size_t wheel_ = 0;
@@ -96,7 +96,7 @@ void import_victoria_park(const VictoriaParkImportOptions& options) {
   refuse_to_overwrite(options.path, options.out);
   guarded_import([&] {
     const io::VictoriaPark recording = io::read_victoria_park(options.path);
-    io::LcmLogWriter writer(options.out);
+    OriginalLog writer(options.out, "understory import");
     Importer(recording, writer, options.raw).run();
     writer.commit();
     fmt::print("{} sweeps, {} wheel samples, {} fixes -> {}\n", recording.scans.size(),

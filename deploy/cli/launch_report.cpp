@@ -76,7 +76,7 @@ void LaunchReport::write(const std::filesystem::path& file,
         {{"time", event.time}, {"process", event.process}, {"text", event.text}});
   }
 
-  write_text_file(file, dumped(report, 2) + "\n");
+  write_text_file(file, result_text(report, 2) + "\n");
 }
 
 }  // namespace understory::cli

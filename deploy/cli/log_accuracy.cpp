@@ -45,7 +45,7 @@ void write_series(const std::string& file, nlohmann::ordered_json json,
   json["map_keyframes"] = poses_json(accuracy.keyframes);
   json["map_landmarks_m"] = points_json(accuracy.landmarks.landmarks_m);
   json["true_landmarks_m"] = points_json(accuracy.landmarks.true_landmarks_m);
-  write_text_file(file, dumped(json, -1) + "\n");
+  write_text_file(file, result_text(json, -1) + "\n");
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -53,6 +54,9 @@ nlohmann::ordered_json to_json(const std::string& file, const LogContents& conte
                               {"damaged_places", contents.damage.places},
                               {"damaged_bytes", contents.damage.bytes},
                               {"events_lost", contents.damage.events_lost}};
+  json["programs"] = nlohmann::ordered_json::array();
+  for (const auto& [process, version] : contents.statistics.programs())
+    json["programs"].push_back({{"process", process}, {"version", version}});
   for (const auto& [name, channel] : contents.statistics.channels()) {
     json["channels"].push_back({{"channel", name},
                                 {"type", channel.type},
@@ -64,6 +68,17 @@ nlohmann::ordered_json to_json(const std::string& file, const LogContents& conte
   }
 
   return json;
+}
+
+/// One line for each version.
+void print_programs(const LogStatistics& statistics) {
+  std::map<std::string, std::string> by_version;
+  for (const auto& [process, version] : statistics.programs()) {
+    std::string& names = by_version[version];
+    names += (names.empty() ? "" : ", ") + terminal::printable(process);
+  }
+  for (const auto& [version, names] : by_version)
+    fmt::print("version {}: {}\n", terminal::printable(version), names);
 }
 
 void print_info(const std::string& file, const LogContents& contents) {
@@ -81,6 +96,8 @@ void print_info(const std::string& file, const LogContents& contents) {
                channel.rate_hz(), channel.bytes, channel.lost);
   }
 
+  print_programs(statistics);
+
   if (contents.damage.places > 0) {
     fmt::print("damaged: {} bytes in {} places (details: understory log check)\n",
                contents.damage.bytes, contents.damage.places);
@@ -90,7 +107,7 @@ void print_info(const std::string& file, const LogContents& contents) {
 void info(const std::string& file, bool json) {
   const auto contents = walk(file, ignore);
   if (json) {
-    fmt::print("{}\n", dumped(to_json(file, contents), 2));
+    fmt::print("{}\n", result_text(to_json(file, contents), 2));
   } else {
     print_info(file, contents);
   }

@@ -4,12 +4,16 @@
 #include <array>
 #include <string_view>
 
+#include "common/wire/convert.hpp"
 #include "common/wire/guard.hpp"
+#include "understory/config_t.hpp"
+#include "understory/health_t.hpp"
 
 namespace understory::cli {
 namespace {
 
 constexpr std::int64_t kClockJumpUs = 10'000'000;
+constexpr std::size_t kMostPrograms = 1000;
 
 /// On these channels every process counts for itself.
 bool counted_per_process(std::string_view channel) {
@@ -37,6 +41,7 @@ void LogStatistics::add(const io::LogEvent& event) {
   ++channel.events;
   channel.bytes += event.data.size();
   check_payload(event, channel);
+  note_program(event);
 
   if (events_ == 0) {
     first_utime_ = event.utime;
@@ -51,6 +56,15 @@ void LogStatistics::add(const io::LogEvent& event) {
   last_utime_ = event.utime;
   last_number_ = event.number;
   ++events_;
+}
+
+void LogStatistics::note_program(const io::LogEvent& event) {
+  if (programs_.size() >= kMostPrograms) return;
+  const auto note = [&](const auto& message) {
+    if (message) programs_.emplace(message->process, message->version);
+  };
+  if (event.channel == "CONFIG") note(wire::decode_message<config_t>(event.data));
+  if (event.channel == "HEALTH") note(wire::decode_message<health_t>(event.data));
 }
 
 void LogStatistics::check_payload(const io::LogEvent& event, ChannelStatistics& channel) {

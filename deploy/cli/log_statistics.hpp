@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "common/io/lcm_log.hpp"
 
@@ -35,6 +37,8 @@ class LogStatistics {
 
   /// By channel name.
   const std::map<std::string, ChannelStatistics>& channels() const { return channels_; }
+  /// The programs that CONFIG and HEALTH name, with their versions; at most 1000.
+  const std::set<std::pair<std::string, std::string>>& programs() const { return programs_; }
   /// Number of events.
   std::uint64_t events() const { return events_; }
   std::int64_t first_utime() const { return first_utime_; }  ///< Receive times [us].
@@ -53,10 +57,12 @@ class LogStatistics {
     std::int64_t utime = 0;
     std::int64_t sequence = 0;
   };
+  void note_program(const io::LogEvent& event);
   void check_payload(const io::LogEvent& event, ChannelStatistics& channel);
 
   std::map<std::string, ChannelStatistics> channels_;
   std::map<std::string, LastHeader> last_headers_;
+  std::set<std::pair<std::string, std::string>> programs_;
   std::uint64_t events_ = 0;
   std::int64_t first_utime_ = 0;
   std::int64_t last_utime_ = 0;

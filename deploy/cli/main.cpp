@@ -1,5 +1,6 @@
 // `understory`: the front door. Exit status: 0 done, 1 the work failed, 2 wrong usage.
 #include "common/bus/process_memory.hpp"
+#include "common/model/program_version.hpp"
 #include "common/terminal/command_line.hpp"
 #include "deploy/cli/commands.hpp"
 
@@ -7,7 +8,7 @@ int main(int argc, char** argv) {
   understory::bus::keep_freed_memory();
   CLI::App app{"Localisation and mapping among landmarks that all look alike.", "understory"};
   app.require_subcommand(1);
-  app.set_version_flag("--version", UNDERSTORY_VERSION);
+  app.set_version_flag("--version", understory::model::program_version());
 
   understory::cli::add_launch_command(app);
   understory::cli::add_sim_command(app);

@@ -132,7 +132,7 @@ void run_map_close(const MapCloseOptions& options) {
     }();
     const std::uint64_t change = options.dry_run ? 0 : write_closure(options, read, made);
     if (options.json) {
-      fmt::print("{}\n", dumped(closure_json(options, read, made, change), 2));
+      fmt::print("{}\n", result_text(closure_json(options, read, made, change), 2));
     } else {
       print_closure(options, read, made, change);
     }

@@ -100,15 +100,18 @@ void map_info(const MapOptions& options) {
   const std::size_t changes = file.history().size();
   if (options.json) {
     nlohmann::ordered_json json{{"file", options.file},
+                                {"written_by", file.program_version()},
                                 {"changes", changes},
                                 {"reference", reference_json(file.reference())},
                                 {"maps", nlohmann::ordered_json::array()}};
     for (const MapSummary& map : maps) json["maps"].push_back(summary_json(map));
-    fmt::print("{}\n", dumped(json, 2));
+    fmt::print("{}\n", result_text(json, 2));
     return;
   }
 
-  fmt::print("{}: {} maps, {} changes\n", options.file, maps.size(), changes);
+  const std::string version = terminal::printable(file.program_version());
+  fmt::print("{}: {} maps, {} changes{}\n", options.file, maps.size(), changes,
+             version.empty() ? version : ", written by version " + version);
   if (const auto reference = file.reference())
     fmt::print("{}\n", terminal::printable(place_text(*reference)));
   fmt::print("{:>5} {:>9} {:>9} {:>9} {:19} {:12} {} (from)\n", "map", "trunks", "corners",
@@ -151,7 +154,7 @@ void map_log(const MapOptions& options) {
                terminal::printable(note.command), terminal::printable(note.source),
                terminal::printable(note.text));
   }
-  if (options.json) fmt::print("{}\n", dumped(json, 2));
+  if (options.json) fmt::print("{}\n", result_text(json, 2));
 }
 
 void map_revert(const MapOptions& options) {
@@ -269,7 +272,7 @@ void map_diff(const MapOptions& options) {
   }
 
   if (options.json) {
-    fmt::print("{}\n", dumped(json, 2));
+    fmt::print("{}\n", result_text(json, 2));
   } else {
     fmt::print(
         "landmarks by id, frames taken to be the same; moved: beyond the quantile {} (chi2 {:.2f}, "

@@ -279,7 +279,7 @@ void run_map_merge(const MapMergeOptions& options) {
   const std::string where = write_merged(options, maps, alignment, merged);
   report_references(options, maps, alignment);
   if (options.json) {
-    fmt::print("{}\n", dumped(merge_json(options, alignment, merged, where), 2));
+    fmt::print("{}\n", result_text(merge_json(options, alignment, merged, where), 2));
   } else {
     print_merge(alignment, merged, where);
   }

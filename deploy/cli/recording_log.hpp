@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "common/io/data_error.hpp"
-#include "common/io/lcm_log.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/wire/convert.hpp"
+#include "deploy/cli/original_log.hpp"
 
 namespace understory::cli {
 
@@ -21,7 +21,7 @@ namespace understory::cli {
 class RecordingLog {
  public:
   /// Throws LogError when the file cannot be created.
-  explicit RecordingLog(const std::string& file) : writer_(file) {}
+  explicit RecordingLog(const std::string& file) : writer_(file, "understory import") {}
 
   /// Keeps a message until the log reaches its stamp; those of one stamp in the order of adding.
   template <class Message>
@@ -109,7 +109,7 @@ class RecordingLog {
     }
   };
 
-  io::LcmLogWriter writer_;
+  OriginalLog writer_;
   Span sweep_span_, small_span_;
   std::multimap<model::Utime, Event> small_;
   std::map<std::string, std::uint64_t> counts_;

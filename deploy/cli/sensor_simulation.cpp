@@ -4,10 +4,10 @@
 
 #include <utility>
 
-#include "common/io/lcm_log.hpp"
 #include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/original_log.hpp"
 #include "sim/point_grid.hpp"
 #include "understory/ground_truth_t.hpp"
 
@@ -185,7 +185,7 @@ void send_readings(sim::SensorDrive& drive, const Publish& publish,
 
 void write_sensor_log(sim::SensorDrive& drive, const std::string& file,
                       const std::function<void(double)>& progress) {
-  io::LcmLogWriter writer(file);
+  OriginalLog writer(file, "understory sim");
   // A log's events are in the order of their stamps: those of sweeps begin before they are sent.
   model::Utime now = 0;
   send_readings(

@@ -8,13 +8,13 @@
 #include <thread>
 
 #include "common/bus/live_bus.hpp"
-#include "common/io/lcm_log.hpp"
 #include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/original_log.hpp"
 #include "deploy/cli/sensor_simulation.hpp"
 #include "deploy/cli/shared_error_options.hpp"
 #include "deploy/cli/sim_changes.hpp"
@@ -91,7 +91,7 @@ void publish_scan(const sim::Drive& drive, std::size_t k, bool wheels, const Pub
 }
 
 void write_log(const sim::Drive& drive, const SimOptions& options) {
-  io::LcmLogWriter writer(options.out);
+  OriginalLog writer(options.out, "understory sim");
   const Publish publish = [&](const std::string& channel, model::Utime utime,
                               const wire::Bytes& bytes) { writer.write(utime, channel, bytes); };
   terminal::Progress progress("simulating", static_cast<double>(drive.size()));

@@ -42,7 +42,7 @@ void print(const StatusTable& table, const viewer::Scene& scene, bool json) {
   if (json) {
     nlohmann::ordered_json document = table.json(now);
     document["pose"] = {{"state", viewer::state_name(verdict.state)}, {"text", verdict.text}};
-    fmt::print("{}\n", dumped(document, 2));
+    fmt::print("{}\n", result_text(document, 2));
   } else {
     fmt::print("pose: {} ({})\n{}", viewer::state_name(verdict.state), verdict.text,
                table.text(now));

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/io/output_file.hpp"
+#include "common/model/program_version.hpp"
 
 namespace understory::cli {
 
@@ -17,6 +18,12 @@ std::string dumped(const nlohmann::ordered_json& json, int indent) {
     text.replace(at, 1, "\\u007f");
   }
   return text;
+}
+
+std::string result_text(const nlohmann::ordered_json& result, int indent) {
+  nlohmann::ordered_json document{{"version", model::program_version()}};
+  document.update(result);
+  return dumped(document, indent);
 }
 
 }  // namespace understory::cli

@@ -15,4 +15,7 @@ void write_text_file(const std::filesystem::path& file, const std::string& text)
 /// ASCII is written as \\uXXXX: nothing that a process sends ends the command or steers a terminal.
 std::string dumped(const nlohmann::ordered_json& json, int indent);
 
+/// The same of a command's result: an object, with "version" of the program in front.
+std::string result_text(const nlohmann::ordered_json& result, int indent);
+
 }  // namespace understory::cli

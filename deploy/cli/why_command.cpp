@@ -117,7 +117,7 @@ void show(story::Answer answer, const ReadLog& log, const WhyOptions& options) {
   if (!answer.story) fail(options.file + ": " + answer.error);
   add_faults(*answer.story, log);
   if (options.json) {
-    fmt::print("{}\n", dumped(story::story_json(*answer.story), 2));
+    fmt::print("{}\n", result_text(story::story_json(*answer.story), 2));
   } else {
     fmt::print("{}", story_page(*answer.story, log.book.start()));
   }

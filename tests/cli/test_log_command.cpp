@@ -1,7 +1,12 @@
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
+#include "common/model/program_version.hpp"
+#include "common/wire/convert.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
+#include "understory/config_t.hpp"
+#include "understory/health_t.hpp"
 
 using namespace understory;
 using namespace understory::test;
@@ -63,6 +68,38 @@ TEST_CASE_METHOD(Fixture, "log info lists what is in a log", "[cli]") {
   const auto json = run("log info --json " + damaged);
   CHECK(json.status == 0);
   CHECK_THAT(json.out, Contains("\"events\": 29") && Contains("\"damaged_places\": 1"));
+}
+
+TEST_CASE_METHOD(Fixture, "log info says which versions made a log", "[cli]") {
+  const std::string made = (directory / "made.lcm").string();
+  {
+    io::LcmLogWriter writer(made);
+    config_t config{};
+    config.process = "ekf";
+    config.version = "1.2.0";
+    writer.write(1, "CONFIG", wire::encode_bytes(config));
+    config.process = "keyframer";
+    writer.write(2, "CONFIG", wire::encode_bytes(config));
+    health_t health{};
+    health.process = "lat\x1b[2J";
+    health.version = "1.1.0";
+    writer.write(3, "HEALTH", wire::encode_bytes(health));
+    writer.commit();
+  }
+  const auto text = run("log info " + made);
+  CHECK_THAT(text.out, Contains("version 1.1.0: lat\\x1b[2J\n") &&
+                           Contains("version 1.2.0: ekf, keyframer\n"));
+  const auto json = nlohmann::json::parse(run("log info --json " + made).out);
+  CHECK(json["version"] == model::program_version());
+  CHECK(json["programs"].size() == 3);
+  CHECK(json["programs"][0]["process"] == "ekf");
+  CHECK(json["programs"][0]["version"] == "1.2.0");
+
+  // A log of a simulation says so itself.
+  const std::string simulated = (directory / "sim.lcm").string();
+  REQUIRE(run("sim intermediate --length 2 --out " + simulated).status == 0);
+  CHECK_THAT(run("log info " + simulated).out,
+             Contains("version " + model::program_version() + ": understory sim\n"));
 }
 
 TEST_CASE_METHOD(Fixture, "log check finds damage and nothing where there is none", "[cli]") {

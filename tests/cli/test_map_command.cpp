@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/map_file/map_file.hpp"
+#include "common/model/program_version.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
 #include "tests/map_file/map_fixture.hpp"
@@ -68,6 +69,9 @@ TEST_CASE_METHOD(Maps, "a survey becomes a map, with its sigma", "[cli]") {
   CHECK(info["maps"][0]["trunks"] == 2);
   CHECK(info["maps"][0]["corners"] == 1);
   CHECK(info["changes"] == 1);
+  CHECK(info["version"] == model::program_version());
+  CHECK(info["written_by"] == model::program_version());
+  CHECK_THAT(fine("info " + file).out, Contains("written by version " + model::program_version()));
 
   // Scripts name standard output; the option may stand anywhere.
   const std::string text = fine("info --json " + file).out;

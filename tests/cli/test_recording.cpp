@@ -1,12 +1,14 @@
 // A recorded drive through the command: import, replay, export.
 #include <map>
 
+#include "common/model/program_version.hpp"
 #include "common/wire/convert.hpp"
 #include "eval/experiments/victoria_park/victoria_park.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/recorded_drive.hpp"
 #include "tests/cli/run_command.hpp"
 #include "tests/data.hpp"
+#include "understory/config_t.hpp"
 #include "understory/ground_truth_t.hpp"
 
 using namespace understory;
@@ -108,8 +110,13 @@ TEST_CASE_METHOD(Fixture, "an imported recording is all in the log, in order", "
   const test::RecordedDrive drive;
   import(drive.path());
   const auto events = events_of(log);
-  CHECK(events.size() == 2 * test::RecordedDrive::kScans - 1 + test::RecordedDrive::kWheelSamples +
-                             test::RecordedDrive::kFixes);
+  // And the program that made the log, in front.
+  CHECK(events.size() == 1 + 2 * test::RecordedDrive::kScans - 1 +
+                             test::RecordedDrive::kWheelSamples + test::RecordedDrive::kFixes);
+  REQUIRE(events[0].channel == "CONFIG");
+  const auto made_by = wire::decode_message<config_t>(events[0].data).value();
+  CHECK(made_by.process == "understory import");
+  CHECK(made_by.version == model::program_version());
   check_holds(events, io::read_victoria_park(drive.path()));
   check_order(events);
 }

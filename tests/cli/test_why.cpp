@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/model/program_version.hpp"
 #include "common/story/story_book.hpp"
 #include "common/wire/convert.hpp"
 #include "tests/catch.hpp"
@@ -72,9 +73,11 @@ std::string fact(const nlohmann::json& story, const std::string& name) {
   return {};
 }
 
-/// Only what services/viewer/protocol.md lists, in its form.
+/// Only what services/viewer/protocol.md lists, in its form, and the version of the program.
 void check_form(const nlohmann::json& story) {
-  const std::set<std::string> parts{"title", "facts", "events", "series", "seen_from", "steps"};
+  CHECK(story.at("version") == model::program_version());
+  const std::set<std::string> parts{"version", "title",     "facts", "events",
+                                    "series",  "seen_from", "steps"};
   for (const auto& [name, value] : story.items()) CHECK(parts.contains(name));
   CHECK(story.at("title").is_string());
   for (const auto& one : story.value("events", nlohmann::json::array())) {

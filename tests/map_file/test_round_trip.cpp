@@ -1,4 +1,5 @@
 // Maps in and out.
+#include "common/model/program_version.hpp"
 #include "tests/map_file/map_fixture.hpp"
 
 using namespace understory;
@@ -29,6 +30,22 @@ TEST_CASE("random maps come back equal to the bit", "[map_file]") {
     REQUIRE(opened.history().size() == 1);
     CHECK(opened.history()[0].note.text == "made");
   }
+}
+
+TEST_CASE("a file states which version of the program wrote it last", "[map_file]") {
+  const TemporaryDirectory directory;
+  const auto file = directory / "maps.gpkg";
+  std::mt19937_64 random(3);
+  const StoredMap map = random_map(1, random);
+  map_file::create_map_file(file, {&map, 1}, note("made"));
+  CHECK(MapFile(file, Access::kRead).program_version() == model::program_version());
+
+  // One that an older version made states none until it is written to.
+  RawFile(file).run("DELETE FROM understory_meta WHERE key = 'program_version'");
+  CHECK(MapFile(file, Access::kRead).program_version().empty());
+  CHECK(MapFile(file, Access::kRead).check().empty());
+  MapFile(file, Access::kWrite).put({&map, 1}, note("again"));
+  CHECK(MapFile(file, Access::kRead).program_version() == model::program_version());
 }
 
 TEST_CASE("equal content has equal checksums, another value another one", "[map_file]") {
