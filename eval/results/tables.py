@@ -2,7 +2,7 @@
 """Writes eval/results/README.md and the results in the project's README.md from eval/results/*.json.
 
   tables.py           write both
-  tables.py --check   change nothing; exit status 1 when either is out of step
+  tables.py --check   change nothing; exit status 1 when either is out of step, or a picture is stored that no page names
 """
 
 import json
@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 sys.dont_write_bytecode = True
+import pictures  # noqa: E402
 import render  # noqa: E402
 import render_closures  # noqa: E402
 import render_existence  # noqa: E402
@@ -300,7 +301,10 @@ def main(arguments):
         for file in stale:
             print(f"{file.relative_to(ROOT)}: out of step with eval/results/*.json; run eval/results/tables.py",
                   file=sys.stderr)
-        return 1 if stale else 0
+        vain = pictures.stored_in_vain()
+        for name in vain:
+            print(f"eval/results/{name}: no page names this picture; name it in eval/results/remarks.md, or delete it", file=sys.stderr)
+        return 1 if stale or vain else 0
     for file, text in wanted.items():
         file.write_text(text)
     return 0
