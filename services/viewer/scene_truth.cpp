@@ -67,8 +67,10 @@ void Scene::compare_with_truth(const model::SlamPose& pose) {
   numbers.error_rad = std::abs(error.z());
   const Eigen::LLT<Eigen::Matrix3d> factor(pose.covariance);
   if (factor.info() == Eigen::Success) numbers.nees = error.dot(factor.solve(error));
-  if (numbers.nees)
-    numbers.is_too_sure = *numbers.nees > (numbers.is_too_sure ? kNeesBound : kTooSureNees);
+  // The best fit of all poses is no truth: in a given map its own error would count for the pose's.
+  const bool is_tied = world_T_map_.has_value();
+  numbers.is_too_sure =
+      is_tied && numbers.nees && *numbers.nees > (numbers.is_too_sure ? kNeesBound : kTooSureNees);
 
   // The path so far: drawn anew when the alignment has moved it by more than is seen.
   const auto in_map = [&](const std::pair<model::Utime, geometry::SE2>& one) {
