@@ -24,6 +24,7 @@ void Node::add_input(const std::string& channel, Take take, SubscribeOptions opt
   const auto& suffixed = options_.suffixed_inputs;
   const bool has_suffix = std::find(suffixed.begin(), suffixed.end(), channel) != suffixed.end();
   auto input = std::make_unique<Input>();
+  input->name = channel;
   input->channel = channel + (has_suffix ? options_.channel_suffix : "");
   input->options = options;
   input->take = std::move(take);
@@ -37,7 +38,7 @@ void Node::add_input(const std::string& channel, Take take, SubscribeOptions opt
 std::size_t Node::add_output(const std::string& channel) {
   const std::string name = channel + options_.channel_suffix;
   if (const auto refusal = check_publishable(name, 0)) throw std::logic_error(refusal->detail);
-  outputs_.push_back({name, 0, monitor_.add_channel(name, true)});
+  outputs_.push_back({channel, name, 0, monitor_.add_channel(name, true)});
   return outputs_.size() - 1;
 }
 
@@ -239,6 +240,13 @@ std::vector<std::string> Node::outputs() const {
   std::vector<std::string> names;
   for (const Output& output : outputs_) names.push_back(output.channel);
   return names;
+}
+
+std::vector<BoundChannel> Node::channels() const {
+  std::vector<BoundChannel> bound;
+  for (const auto& input : inputs_) bound.push_back({Flow::kIn, input->name});
+  for (const Output& output : outputs_) bound.push_back({Flow::kOut, output.name});
+  return bound;
 }
 
 const SequenceCounts& Node::sequence_counts(std::string_view channel) const {

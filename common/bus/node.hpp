@@ -19,6 +19,7 @@
 
 #include "common/bus/announcer.hpp"
 #include "common/bus/bus.hpp"
+#include "common/bus/channel_list.hpp"
 #include "common/bus/clock.hpp"
 #include "common/bus/condition.hpp"
 #include "common/bus/health_monitor.hpp"
@@ -156,6 +157,8 @@ class Node {
   bool takes(std::string_view channel) const;
   /// Names of the outputs, suffix included; HEALTH, LOG and CONFIG are not among them.
   std::vector<std::string> outputs() const;
+  /// Every input and output as the adapter names it, without suffix.
+  std::vector<BoundChannel> channels() const;
   /// The message for HEALTH, as of now.
   health_t health();
   /// Publishes HEALTH, where the options allow it.
@@ -179,7 +182,8 @@ class Node {
   using Take =
       std::function<std::optional<wire::Refusal>(std::span<const std::uint8_t>, const Admit&)>;
   struct Input {
-    std::string channel;
+    std::string name;     ///< As the adapter calls it.
+    std::string channel;  ///< With the suffix, where it carries one.
     SubscribeOptions options;
     Take take;
     SequenceTracker sequence;
@@ -190,7 +194,8 @@ class Node {
     std::size_t health = 0;
   };
   struct Output {
-    std::string channel;
+    std::string name;     ///< As the adapter calls it.
+    std::string channel;  ///< With the suffix.
     std::int64_t next_sequence = 0;
     std::size_t health = 0;
   };

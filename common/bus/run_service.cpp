@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
 #include <iostream>
 
 #include "common/bus/config_file.hpp"
@@ -168,7 +169,7 @@ int serve(const Service& service, const Options& options) {
   std::string printed;
   const RuntimeParameters runtime = check_config(service, toml, options.config, &printed);
   if (options.prints_config) {
-    std::cout << "# " << service.name << ": " << service.summary << "\n" << printed;
+    std::cout << "# " << service.name << ": " << service.channels.summary() << "\n" << printed;
     return kDone;
   }
 
@@ -206,7 +207,9 @@ std::string parameters_help(const Service& service) {
 
 int run_service(const Service& service, int argc, char** argv) {
   keep_freed_memory();
-  CLI::App app(service.name + ": " + service.summary, "understory-" + service.name);
+  // The name that it was called by: a usage line that can be typed.
+  CLI::App app(service.name + ": " + service.channels.summary(),
+               std::filesystem::path(argv[0]).filename().string());
   Options options;
   app.add_option("--config", options.config, "Configuration file (TOML)");
   app.add_option("--lcm-url", options.lcm_url, "Bus; default LCM_DEFAULT_URL or LCM's own");
@@ -219,7 +222,7 @@ int run_service(const Service& service, int argc, char** argv) {
   app.add_flag("--print-config", options.prints_config, "Print the configuration file in force");
   app.set_version_flag("--version", program_version());
   try {
-    app.footer(parameters_help(service));
+    app.footer(service.channels.help() + "\n" + parameters_help(service));
     app.parse(argc, argv);
     return serve(service, options);
   } catch (const CLI::ParseError& error) {

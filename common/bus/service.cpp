@@ -1,6 +1,7 @@
 #include "common/bus/service.hpp"
 
 #include <sstream>
+#include <stdexcept>
 
 #include "common/model/program_version.hpp"
 
@@ -64,6 +65,8 @@ HostedService::HostedService(const Service& service, Bus& bus, const Clock& cloc
   if (adjust) adjust(runtime_);
   node_ = std::make_unique<Node>(bus, node_options(service.name, runtime_), clock);
   adapter_->bind(*node_);
+  const std::string difference = service.channels.difference(node_->channels());
+  if (!difference.empty()) throw std::logic_error(service.name + ": " + difference);
   node_->keep_state([this] { return adapter_->save(); },
                     [this](const std::string& state) { adapter_->load(state); },
                     [this](std::int64_t written_s) { adapter_->state_was_lost(written_s); });

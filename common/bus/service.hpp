@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "common/bus/channel_list.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/parameter_table.hpp"
 
@@ -35,8 +36,8 @@ class Adapter {
 
 /// A service by name, and how to make its adapter.
 struct Service {
-  std::string name;     ///< As in the executable's name and in HEALTH, e.g. keyframer.
-  std::string summary;  ///< One line: what it takes and gives.
+  std::string name;      ///< As in the executable's name and in HEALTH, e.g. keyframer.
+  ChannelList channels;  ///< What its adapter subscribes and publishes, no more and no less.
   std::function<std::unique_ptr<Adapter>()> make;
 };
 
@@ -63,7 +64,8 @@ NodeOptions node_options(const std::string& process, const RuntimeParameters& pa
 class HostedService {
  public:
   /// `toml` and its name, as ParameterTable::load_text takes them; throws ConfigurationError.
-  /// `adjust` gets the runtime parameters after loading and may change them.
+  /// `adjust` gets the runtime parameters after loading and may change them. Throws
+  /// std::logic_error where the adapter binds other channels than the service declares.
   HostedService(const Service& service, Bus& bus, const Clock& clock, const std::string& toml,
                 const std::string& toml_name,
                 const std::function<void(RuntimeParameters&)>& adjust = {});

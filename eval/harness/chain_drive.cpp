@@ -189,7 +189,9 @@ void put_in(const FalseDetectionOptions& options, const sim::SensorDrive& drive,
   constexpr const char* kFound = "LANDMARKS_FOUND";
   const auto extractor = std::ranges::find(services, "landmark_extractor", &bus::Service::name);
   if (extractor == services.end()) return;
-  *extractor = landmark_extractor::landmark_extractor_service({.landmarks = kFound});
+  landmark_extractor::LandmarkExtractorChannels channels;
+  channels.all.rename(channels.landmarks, kFound);
+  *extractor = landmark_extractor::landmark_extractor_service(channels);
   const auto truth = [&drive](model::Utime utime) { return drive.state_at(utime).world_T_level(); };
   services.insert(std::next(extractor),
                   false_detection_service(options, truth, counts, kFound, "LANDMARKS"));

@@ -113,7 +113,10 @@ bus::Service false_detection_service(const FalseDetectionOptions& options,
                                      std::function<geometry::SE2(model::Utime)> world_T_vehicle,
                                      std::shared_ptr<FalseDetectionCounts> counts,
                                      const std::string& found, const std::string& landmarks) {
-  return {"false_detections", found + " -> " + landmarks,
+  bus::ChannelList channels;
+  channels.in(found, "detections of one sweep");
+  channels.out(landmarks, "the same with false ones among them");
+  return {"false_detections", channels,
           [options, world_T_vehicle = std::move(world_T_vehicle), counts = std::move(counts), found,
            landmarks] {
             return std::make_unique<FalseDetections>(options, world_T_vehicle, counts, found,

@@ -58,7 +58,10 @@ class OneScanAdapter : public bus::Adapter {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return bus::run_service({"swapped-keyframer", "LANDMARKS -> KEYFRAME",
-                           [] { return std::make_unique<OneScanAdapter>(); }},
-                          argc, argv);
+  bus::ChannelList channels;
+  channels.in("LANDMARKS", "detections of one sweep");
+  channels.out("KEYFRAME", "local landmarks of one sweep");
+  return bus::run_service(
+      {"swapped-keyframer", channels, [] { return std::make_unique<OneScanAdapter>(); }}, argc,
+      argv);
 }

@@ -80,9 +80,7 @@ class AssociatorAdapter : public bus::Adapter {
 }  // namespace
 
 bus::Service associator_service(const AssociatorChannels& channels) {
-  return {"associator",
-          channels.landmarks + ", " + channels.odometry + ", " + channels.filter_pose + " -> " +
-              channels.tracked_landmarks,
+  return {"associator", channels.all,
           [channels] { return std::make_unique<AssociatorAdapter>(channels); }};
 }
 

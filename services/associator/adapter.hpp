@@ -7,12 +7,14 @@
 
 namespace understory::associator {
 
-/// Names of the channels that the process reads and writes.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct AssociatorChannels {
-  std::string landmarks = "LANDMARKS";
-  std::string odometry = "ODOMETRY";
-  std::string filter_pose = "EKF_POSE";
-  std::string tracked_landmarks = "TRACKED_LANDMARKS";
+  bus::ChannelList all;
+  std::string landmarks = all.in("LANDMARKS", "detections of one sweep");
+  std::string odometry = all.in("ODOMETRY", "motion without landmarks, where there is any");
+  std::string filter_pose = all.in("EKF_POSE", "pose of the filter, one sweep behind");
+  std::string tracked_landmarks =
+      all.out("TRACKED_LANDMARKS", "the consistent detections, with track ids");
 };
 
 /// The process: its name, its channels and how to make its adapter. The stage is made when the

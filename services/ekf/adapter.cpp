@@ -100,11 +100,7 @@ class EkfAdapter : public bus::Adapter {
 }  // namespace
 
 bus::Service ekf_service(const EkfChannels& channels) {
-  return {"ekf",
-          channels.odometry + ", " + channels.tracked_landmarks + ", " + channels.raw_pose +
-              " -> " + channels.pose + ", " + channels.map + ", " + channels.level + ", " +
-              channels.velocity_correction,
-          [channels] { return std::make_unique<EkfAdapter>(channels); }};
+  return {"ekf", channels.all, [channels] { return std::make_unique<EkfAdapter>(channels); }};
 }
 
 }  // namespace understory::ekf

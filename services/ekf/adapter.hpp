@@ -7,15 +7,17 @@
 
 namespace understory::ekf {
 
-/// Names of the channels; README.md lists their messages.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct EkfChannels {
-  std::string odometry = "ODOMETRY";
-  std::string tracked_landmarks = "TRACKED_LANDMARKS";
-  std::string raw_pose = "RAW_POSE";
-  std::string pose = "EKF_POSE";
-  std::string map = "EKF_MAP";
-  std::string level = "EKF_LEVEL";
-  std::string velocity_correction = "VELOCITY_CORRECTION";
+  bus::ChannelList all;
+  std::string odometry = all.in("ODOMETRY", "motion without landmarks");
+  std::string tracked_landmarks = all.in("TRACKED_LANDMARKS", "consistent detections of one sweep");
+  std::string raw_pose = all.in("RAW_POSE", "dead reckoning, for gaps");
+  std::string pose = all.out("EKF_POSE", "pose, velocity and biases");
+  std::string map = all.out("EKF_MAP", "landmarks of the active state");
+  std::string level = all.out("EKF_LEVEL", "error of roll and pitch of the sweeps");
+  std::string velocity_correction =
+      all.out("VELOCITY_CORRECTION", "velocity and biases, for the input stage");
 };
 
 /// The filter as a service: decodes, calls Ekf, publishes. Its state is saved and loaded by the

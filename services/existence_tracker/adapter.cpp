@@ -144,9 +144,7 @@ class TrackerAdapter : public bus::Adapter {
 }  // namespace
 
 bus::Service existence_tracker_service(const TrackerChannels& channels) {
-  return {"existence_tracker",
-          channels.slam_update + ", " + channels.map + ", " + channels.map_delta + " -> " +
-              channels.existence + ", " + channels.existence_state + ", " + channels.map_request,
+  return {"existence_tracker", channels.all,
           [channels] { return std::make_unique<TrackerAdapter>(channels); }};
 }
 

@@ -469,14 +469,7 @@ class MapperAdapter : public bus::Adapter {
 }  // namespace
 
 bus::Service geoslam_mapper_service(const MapperChannels& channels) {
-  return {"geoslam_mapper",
-          channels.keyframe + ", " + channels.landmarks + ", " + channels.view_ranges + ", " +
-              channels.odometry + ", " + channels.ekf_pose + ", " + channels.ekf_level + ", " +
-              channels.given_map + ", " + channels.submap_stored + ", " + channels.submap_reply +
-              ", " + channels.loop_closure + ", " + channels.existence + " -> " +
-              channels.slam_pose + ", " + channels.slam_update + ", " + channels.map + ", " +
-              channels.map_delta + ", " + channels.submap + ", " + channels.submap_query + ", " +
-              channels.map_correction + ", " + channels.loop_result,
+  return {"geoslam_mapper", channels.all,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

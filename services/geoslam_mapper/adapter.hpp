@@ -7,31 +7,31 @@
 
 namespace understory::geoslam_mapper {
 
-/// Names of the channels; see the README for what each carries.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct MapperChannels {
-  // In.
-  std::string keyframe = "KEYFRAME";
-  std::string landmarks = "LANDMARKS";
-  std::string view_ranges = "VIEW_RANGES";
-  std::string odometry = "ODOMETRY";
-  std::string rest_level = "REST_LEVEL";
-  std::string ekf_pose = "EKF_POSE";
-  std::string ekf_level = "EKF_LEVEL";
-  std::string map_request = "MAP_REQUEST";
-  std::string given_map = "GIVEN_MAP";
-  std::string submap_stored = "SUBMAP_STORED";
-  std::string submap_reply = "SUBMAP_REPLY";
-  std::string loop_closure = "LOOP_CLOSURE";
-  std::string existence = "EXISTENCE";
-  // Out.
-  std::string slam_pose = "SLAM_POSE";
-  std::string slam_update = "SLAM_UPDATE";
-  std::string map = "MAP";
-  std::string map_delta = "MAP_DELTA";
-  std::string submap = "SUBMAP";
-  std::string submap_query = "SUBMAP_QUERY";
-  std::string map_correction = "MAP_CORRECTION";
-  std::string loop_result = "LOOP_RESULT";
+  bus::ChannelList all;
+  std::string keyframe = all.in("KEYFRAME", "local landmarks of n sweeps");
+  std::string landmarks = all.in("LANDMARKS", "every sweep, located at once");
+  std::string view_ranges = all.in("VIEW_RANGES", "free range of each sweep, by bearing");
+  std::string odometry = all.in("ODOMETRY", "motion without landmarks, where there is any");
+  std::string rest_level =
+      all.in("REST_LEVEL", "level of the vehicle at rest, as motion showed it");
+  std::string ekf_pose = all.in("EKF_POSE", "motion as a gate; velocity where there are no wheels");
+  std::string ekf_level = all.in("EKF_LEVEL", "error of roll and pitch of the sweeps");
+  std::string map_request = all.in("MAP_REQUEST", "asks for MAP now");
+  std::string given_map = all.in("GIVEN_MAP", "a map to start with");
+  std::string submap_stored = all.in("SUBMAP_STORED", "the store has a submap on disk");
+  std::string submap_reply = all.in("SUBMAP_REPLY", "a submap that SUBMAP_QUERY asked for");
+  std::string loop_closure = all.in("LOOP_CLOSURE", "two places and their relative pose");
+  std::string existence = all.in("EXISTENCE", "landmarks that are in use or out of use");
+  std::string slam_pose = all.out("SLAM_POSE", "pose of the vehicle at each sweep");
+  std::string slam_update = all.out("SLAM_UPDATE", "result of each keyframe");
+  std::string map = all.out("MAP", "the whole map: rarely, at the end and on request");
+  std::string map_delta = all.out("MAP_DELTA", "changes of the map, per keyframe");
+  std::string submap = all.out("SUBMAP", "a submap far from the vehicle, for the store");
+  std::string submap_query = all.out("SUBMAP_QUERY", "asks the store for submaps near the vehicle");
+  std::string map_correction = all.out("MAP_CORRECTION", "poses of the submaps");
+  std::string loop_result = all.out("LOOP_RESULT", "a closure was taken or refused, and why");
 };
 
 /// The mapper as a service: name, channels and what makes its adapter.

@@ -29,7 +29,7 @@ struct HesaiFamily {
 }  // namespace
 
 bus::Service hesai_driver_service(const HesaiDriverChannels& channels) {
-  return {"hesai_driver", "a Hesai laser's UDP packets -> " + channels.raw_sweep, [channels] {
+  return {"hesai_driver", channels.all, [channels] {
             return std::make_unique<lidar_driver::DriverAdapter<HesaiFamily>>(
                 lidar_driver::DriverChannels{channels.raw_sweep, "", ""});
           }};

@@ -7,9 +7,10 @@
 
 namespace understory::hesai_driver {
 
-/// Names of the channels that it publishes on.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct HesaiDriverChannels {
-  std::string raw_sweep = "RAW_SWEEP";
+  bus::ChannelList all{"UDP packets of a Hesai laser (data port)"};
+  std::string raw_sweep = all.out("RAW_SWEEP", "revolutions of the laser, in parts");
 };
 
 /// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to

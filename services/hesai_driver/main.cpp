@@ -1,10 +1,6 @@
-// The Hesai driver as a process: every channel that it touches, besides HEALTH, LOG, CONFIG.
+// The Hesai driver as a process. Its channels: HesaiDriverChannels in adapter.hpp, and --help.
 #include "services/hesai_driver/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::bus::run_service(
-      understory::hesai_driver::hesai_driver_service({
-          .raw_sweep = "RAW_SWEEP",  // out: turns of the sensor, in parts; in: UDP, data port
-      }),
-      argc, argv);
+  return understory::bus::run_service(understory::hesai_driver::hesai_driver_service(), argc, argv);
 }

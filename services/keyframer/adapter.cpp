@@ -105,9 +105,7 @@ class KeyframerAdapter : public bus::Adapter {
 }  // namespace
 
 bus::Service keyframer_service(const KeyframerChannels& channels) {
-  return {"keyframer",
-          channels.landmarks + ", " + channels.odometry + ", " + channels.ekf_level + " -> " +
-              channels.keyframe,
+  return {"keyframer", channels.all,
           [channels] { return std::make_unique<KeyframerAdapter>(channels); }};
 }
 

@@ -7,12 +7,14 @@
 
 namespace understory::keyframer {
 
-/// Names of the channels that the process reads and writes.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct KeyframerChannels {
-  std::string landmarks = "LANDMARKS";
-  std::string odometry = "ODOMETRY";
-  std::string ekf_level = "EKF_LEVEL";
-  std::string keyframe = "KEYFRAME";
+  bus::ChannelList all;
+  std::string landmarks = all.in("LANDMARKS", "detections of one sweep");
+  std::string odometry = all.in("ODOMETRY", "motion without landmarks, where there is any");
+  std::string ekf_level =
+      all.in("EKF_LEVEL", "error of roll and pitch of the sweeps, where a filter runs");
+  std::string keyframe = all.out("KEYFRAME", "local landmarks of n sweeps");
 };
 
 /// The process: its name, its channels and how to make its adapter. The stage is made when the

@@ -154,9 +154,7 @@ class LandmarkExtractorAdapter : public bus::Adapter {
 }  // namespace
 
 bus::Service landmark_extractor_service(const LandmarkExtractorChannels& channels) {
-  return {"landmark_extractor",
-          channels.lidar_scan + ", " + channels.lidar_sweep + " -> " + channels.landmarks + ", " +
-              channels.view_ranges + ", " + channels.place_scan,
+  return {"landmark_extractor", channels.all,
           [channels] { return std::make_unique<LandmarkExtractorAdapter>(channels); }};
 }
 

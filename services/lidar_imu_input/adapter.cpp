@@ -198,12 +198,7 @@ class LidarImuInputAdapter : public bus::Adapter {
 }  // namespace
 
 bus::Service lidar_imu_input_service(const LidarImuInputChannels& channels) {
-  return {"lidar_imu_input",
-          channels.raw_imu + ", " + channels.raw_wheels + ", " + channels.raw_gnss + ", " +
-              channels.raw_sweep + ", " + channels.raw_scan + ", " + channels.velocity_correction +
-              ", " + channels.ekf_pose + " -> " + channels.imu + ", " + channels.wheels + ", " +
-              channels.gnss + ", " + channels.odometry + ", " + channels.raw_pose + ", " +
-              channels.lidar_sweep + ", " + channels.lidar_scan,
+  return {"lidar_imu_input", channels.all,
           [channels] { return std::make_unique<LidarImuInputAdapter>(channels); }};
 }
 

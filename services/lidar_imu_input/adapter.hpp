@@ -7,23 +7,27 @@
 
 namespace understory::lidar_imu_input {
 
-/// Names of the channels; every one can be replaced, for tests and for two vehicles on one bus.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct LidarImuInputChannels {
-  std::string raw_imu = "RAW_IMU";
-  std::string raw_wheels = "RAW_WHEELS";
-  std::string raw_gnss = "RAW_GNSS";
-  std::string raw_sweep = "RAW_SWEEP";
-  std::string raw_scan = "RAW_SCAN";
-  std::string velocity_correction = "VELOCITY_CORRECTION";
-  std::string ekf_pose = "EKF_POSE";
-  std::string imu = "IMU";
-  std::string wheels = "WHEELS";
-  std::string gnss = "GNSS";
-  std::string odometry = "ODOMETRY";
-  std::string rest_level = "REST_LEVEL";
-  std::string raw_pose = "RAW_POSE";
-  std::string lidar_sweep = "LIDAR_SWEEP";
-  std::string lidar_scan = "LIDAR_SCAN";
+  bus::ChannelList all;
+  std::string raw_imu = all.in("RAW_IMU", "angular rate and specific force, frame sensor");
+  std::string raw_wheels = all.in("RAW_WHEELS", "speed and steering");
+  std::string raw_gnss = all.in("RAW_GNSS", "fixes, for reference only");
+  std::string raw_sweep = all.in("RAW_SWEEP", "sweeps of the laser as measured, in parts");
+  std::string raw_scan = all.in("RAW_SCAN", "scans of a one-plane laser");
+  std::string velocity_correction =
+      all.in("VELOCITY_CORRECTION", "correction of RAW_POSE by the filter");
+  std::string ekf_pose =
+      all.in("EKF_POSE", "motion of the filter, for a laser without IMU and wheels");
+  std::string imu = all.out("IMU", "checked, frame vehicle");
+  std::string wheels = all.out("WHEELS", "checked");
+  std::string gnss = all.out("GNSS", "checked");
+  std::string odometry = all.out("ODOMETRY", "motion without landmarks");
+  std::string rest_level =
+      all.out("REST_LEVEL", "level of the vehicle at rest, as motion showed it");
+  std::string raw_pose = all.out("RAW_POSE", "dead reckoning");
+  std::string lidar_sweep = all.out("LIDAR_SWEEP", "de-skewed sweeps with attitude, in parts");
+  std::string lidar_scan = all.out("LIDAR_SCAN", "scans of the one-plane laser, checked");
 };
 
 /// The service, for run_service() and replay. It refuses to start with parameters out of range.

@@ -33,9 +33,7 @@ struct LivoxFamily {
 }  // namespace
 
 bus::Service livox_driver_service(const LivoxDriverChannels& channels) {
-  return {"livox_driver",
-          "a Livox laser's UDP packets -> " + channels.raw_sweep + ", " + channels.raw_imu,
-          [channels] {
+  return {"livox_driver", channels.all, [channels] {
             return std::make_unique<lidar_driver::DriverAdapter<LivoxFamily>>(
                 lidar_driver::DriverChannels{channels.raw_sweep, channels.raw_imu, ""});
           }};

@@ -7,10 +7,11 @@
 
 namespace understory::livox_driver {
 
-/// Names of the channels that it publishes on.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct LivoxDriverChannels {
-  std::string raw_sweep = "RAW_SWEEP";
-  std::string raw_imu = "RAW_IMU";
+  bus::ChannelList all{"UDP packets of a Livox laser (points port, imu port)"};
+  std::string raw_sweep = all.out("RAW_SWEEP", "sweeps of 0.1 s, in parts");
+  std::string raw_imu = all.out("RAW_IMU", "samples of its IMU");
 };
 
 /// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to

@@ -108,9 +108,7 @@ class LoopCloserAdapter : public bus::Adapter {
 }  // namespace
 
 bus::Service loop_closer_service(const LoopCloserChannels& channels) {
-  return {"loop_closer",
-          channels.keyframe + ", " + channels.slam_update + ", " + channels.submap + ", " +
-              channels.place_scan + ", " + channels.loop_result + " -> " + channels.loop_closure,
+  return {"loop_closer", channels.all,
           [channels] { return std::make_unique<LoopCloserAdapter>(channels); }};
 }
 

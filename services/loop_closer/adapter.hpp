@@ -7,14 +7,15 @@
 
 namespace understory::loop_closer {
 
-/// Names of the channels that the process reads and writes.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct LoopCloserChannels {
-  std::string keyframe = "KEYFRAME";
-  std::string place_scan = "PLACE_SCAN";
-  std::string slam_update = "SLAM_UPDATE";
-  std::string submap = "SUBMAP";
-  std::string loop_result = "LOOP_RESULT";
-  std::string loop_closure = "LOOP_CLOSURE";
+  bus::ChannelList all;
+  std::string keyframe = all.in("KEYFRAME", "local landmarks, to recognise places");
+  std::string place_scan = all.in("PLACE_SCAN", "clouds, for detectors that compare clouds");
+  std::string slam_update = all.in("SLAM_UPDATE", "pose of each keyframe in the map");
+  std::string submap = all.in("SUBMAP", "keyframes that the mapper gave to the store");
+  std::string loop_result = all.in("LOOP_RESULT", "a closure was taken or refused, and why");
+  std::string loop_closure = all.out("LOOP_CLOSURE", "two places and their relative pose");
 };
 
 /// The process: its name, its channels and how to make its adapter. The stage is made when the

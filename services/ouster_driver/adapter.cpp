@@ -36,9 +36,7 @@ struct OusterFamily {
 }  // namespace
 
 bus::Service ouster_driver_service(const OusterDriverChannels& channels) {
-  return {"ouster_driver",
-          "an Ouster laser's UDP packets -> " + channels.raw_sweep + ", " + channels.raw_imu,
-          [channels] {
+  return {"ouster_driver", channels.all, [channels] {
             return std::make_unique<lidar_driver::DriverAdapter<OusterFamily>>(
                 lidar_driver::DriverChannels{channels.raw_sweep, channels.raw_imu, ""});
           }};

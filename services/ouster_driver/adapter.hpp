@@ -7,10 +7,11 @@
 
 namespace understory::ouster_driver {
 
-/// Names of the channels that it publishes on.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct OusterDriverChannels {
-  std::string raw_sweep = "RAW_SWEEP";
-  std::string raw_imu = "RAW_IMU";
+  bus::ChannelList all{"UDP packets of an Ouster laser (lidar port, imu port)"};
+  std::string raw_sweep = all.out("RAW_SWEEP", "frames of the laser, in parts");
+  std::string raw_imu = all.out("RAW_IMU", "samples of its IMU");
 };
 
 /// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to

@@ -312,12 +312,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
 }  // namespace
 
 bus::Service submap_store_service(const StoreChannels& channels) {
-  return {"submap_store",
-          channels.submap + ", " + channels.submap_query + ", " + channels.map_correction + ", " +
-              channels.map + ", " + channels.map_delta + ", " + channels.slam_update + ", " +
-              channels.loop_closure + ", " + channels.loop_result + ", " +
-              channels.existence_state + " -> " + channels.submap_stored + ", " +
-              channels.submap_reply + ", " + channels.map_request,
+  return {"submap_store", channels.all,
           [channels] { return std::make_unique<StoreAdapter>(channels); }};
 }
 

@@ -7,22 +7,22 @@
 
 namespace understory::submap_store {
 
-/// Names of the channels; see the README for what each carries.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct StoreChannels {
-  // In.
-  std::string submap = "SUBMAP";
-  std::string submap_query = "SUBMAP_QUERY";
-  std::string map_correction = "MAP_CORRECTION";
-  std::string map = "MAP";
-  std::string map_delta = "MAP_DELTA";
-  std::string slam_update = "SLAM_UPDATE";
-  std::string loop_closure = "LOOP_CLOSURE";
-  std::string loop_result = "LOOP_RESULT";
-  std::string existence_state = "EXISTENCE_STATE";
-  // Out.
-  std::string submap_stored = "SUBMAP_STORED";
-  std::string submap_reply = "SUBMAP_REPLY";
-  std::string map_request = "MAP_REQUEST";
+  bus::ChannelList all;
+  std::string submap = all.in("SUBMAP", "a submap to keep");
+  std::string submap_query = all.in("SUBMAP_QUERY", "asks for submaps");
+  std::string map_correction = all.in("MAP_CORRECTION", "poses of the submaps");
+  std::string map = all.in("MAP", "all that the mapper holds itself");
+  std::string map_delta = all.in("MAP_DELTA", "changes of that");
+  std::string slam_update = all.in("SLAM_UPDATE", "keyframes of the mapper");
+  std::string loop_closure = all.in("LOOP_CLOSURE", "two places and their relative pose");
+  std::string loop_result = all.in("LOOP_RESULT", "a closure was taken or refused, and why");
+  std::string existence_state =
+      all.in("EXISTENCE_STATE", "state of each landmark, for the next drive");
+  std::string submap_stored = all.out("SUBMAP_STORED", "a submap is on disk");
+  std::string submap_reply = all.out("SUBMAP_REPLY", "a submap that SUBMAP_QUERY asked for");
+  std::string map_request = all.out("MAP_REQUEST", "asks for MAP where changes were missed");
 };
 
 /// The store as a service: name, channels and what makes its adapter. The adapter is a bus::Device:

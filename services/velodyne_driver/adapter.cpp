@@ -50,9 +50,7 @@ struct VelodyneFamily {
 }  // namespace
 
 bus::Service velodyne_driver_service(const VelodyneDriverChannels& channels) {
-  return {"velodyne_driver",
-          "a Velodyne laser's UDP packets -> " + channels.raw_sweep + ", " + channels.raw_gnss,
-          [channels] {
+  return {"velodyne_driver", channels.all, [channels] {
             return std::make_unique<lidar_driver::DriverAdapter<VelodyneFamily>>(
                 lidar_driver::DriverChannels{channels.raw_sweep, "", channels.raw_gnss});
           }};

@@ -7,10 +7,11 @@
 
 namespace understory::velodyne_driver {
 
-/// Names of the channels that it publishes on.
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct VelodyneDriverChannels {
-  std::string raw_sweep = "RAW_SWEEP";
-  std::string raw_gnss = "RAW_GNSS";
+  bus::ChannelList all{"UDP packets of a Velodyne laser (data port, position port)"};
+  std::string raw_sweep = all.out("RAW_SWEEP", "revolutions of the laser, in parts");
+  std::string raw_gnss = all.out("RAW_GNSS", "fixes of its GNSS receiver");
 };
 
 /// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to

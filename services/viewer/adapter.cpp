@@ -135,9 +135,17 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
 
 }  // namespace
 
+bus::ChannelList shown_channels() {
+  bus::ChannelList list("", "a web page, and the Foxglove protocol");
+  for_each_channel([&]<class T>(const char* channel, const ChannelTraits& traits, auto /*take*/) {
+    if (traits.is_bulk) list.in_if(channel, "shown where input.sweeps is true");
+    if (!traits.is_bulk) list.in(channel, "shown on the page, or passed on to Foxglove");
+  });
+  return list;
+}
+
 bus::Service viewer_service(const ViewerChannels& channels) {
-  return {"viewer", "all channels that people look at -> a web page, " + channels.map_request,
-          [channels] { return std::make_unique<ViewerAdapter>(channels); }};
+  return {"viewer", channels.all, [channels] { return std::make_unique<ViewerAdapter>(channels); }};
 }
 
 }  // namespace understory::viewer

@@ -7,9 +7,13 @@
 
 namespace understory::viewer {
 
-/// Name of the channel that it writes; those that it hears are in scene_channels.hpp.
+/// The channels of scene_channels.hpp as inputs, and a web page.
+bus::ChannelList shown_channels();
+
+/// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct ViewerChannels {
-  std::string map_request = "MAP_REQUEST";
+  bus::ChannelList all = shown_channels();
+  std::string map_request = all.out("MAP_REQUEST", "asks for MAP where the viewer started late");
 };
 
 /// The process. In a replay it hears nothing and says nothing.

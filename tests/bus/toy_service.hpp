@@ -55,7 +55,10 @@ class ToyAdapter : public bus::Adapter {
 };
 
 inline bus::Service toy_service() {
-  return {"toy", "ODOMETRY -> RAW_POSE", [] { return std::make_unique<ToyAdapter>(); }};
+  bus::ChannelList channels;
+  channels.in("ODOMETRY", "steps");
+  channels.out("RAW_POSE", "the sum of the steps");
+  return {"toy", channels, [] { return std::make_unique<ToyAdapter>(); }};
 }
 
 /// The i-th input: 100 ms apart, x = i + 1 (whole numbers: sums are exact).

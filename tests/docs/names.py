@@ -5,7 +5,7 @@
 
 A file is any `path/to/file` whose first part is a folder of the tree; what its name goes on with may be missing (`docs/decisions/020`). Parameters are the first cells of the tables in docs/tuning.md, in the
 section of their process; docs/parameters.md, made from the processes, has all. Processes and channels of the picture of the architecture are those of
-services/*/main.cpp. A command is `understory WORD ...` in code: `--help` of its
+services/*/adapter.hpp. A command is `understory WORD ...` in code: `--help` of its
 words must succeed and name its options.
 """
 import argparse
@@ -71,7 +71,8 @@ def missing_in_picture(root):
     """The picture of the architecture: boxes of processes, labels with channels."""
     mains = sorted((root / "services").glob("*/main.cpp"))
     processes = {main.parent.name for main in mains}
-    channels = {channel for main in mains for channel in re.findall(r'\.\w+ = "([A-Z0-9_]+)"', main.read_text())}
+    channels = {channel for main in mains
+                for channel in re.findall(r'\ball\.(?:in|out)\(\s*"([A-Z0-9_]+)"', (main.parent / "adapter.hpp").read_text())}
     text = (root / "docs/pictures/architecture.svg").read_text()
     boxes = set(re.findall(r'class="n"[^>]*>([a-z_]+)<', text))
     labels = {name for label in re.findall(r'class="l"[^>]*>([^<]+)<', text) for name in re.findall(r"\b[A-Z][A-Z_]{2,}\b", label)}

@@ -96,7 +96,10 @@ TEST_CASE("sweeps that cannot be are counted and give nothing", "[extractor]") {
 TEST_CASE("the extractor's parameters and channels are those it was given", "[extractor]") {
   std::mt19937_64 random(3);
   const model::PlanarScan scan = numbered_sweep(0, random);
-  Bench near("[planar]\nmax_range_m = 5\n", {.lidar_scan = "FRONT", .landmarks = "FRONT_MARKS"});
+  LandmarkExtractorChannels front;
+  front.all.rename(front.lidar_scan, "FRONT");
+  front.all.rename(front.landmarks, "FRONT_MARKS");
+  Bench near("[planar]\nmax_range_m = 5\n", front);
   near.send(scan);
   CHECK(near.landmarks.empty());
   near.send(wire::encode_message(scan), "FRONT");
