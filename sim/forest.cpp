@@ -134,6 +134,12 @@ std::optional<ForestKind> forest_kind(std::string_view name) {
   return std::nullopt;
 }
 
+std::vector<std::string> forest_names() {
+  std::vector<std::string> names;
+  for (const auto& [value, name] : kForestNames) names.emplace_back(name);
+  return names;
+}
+
 Forest make_forest(const ForestParameters& parameters, std::mt19937_64& random) {
   Forest forest;
   forest.high_m = Eigen::Vector2d::Constant(parameters.side_m);

@@ -39,6 +39,8 @@ ForestParameters forest_parameters(ForestKind kind);
 std::string_view to_string(ForestKind kind);
 /// The kind of this name; none for another.
 std::optional<ForestKind> forest_kind(std::string_view name);
+/// All names that forest_kind() takes.
+std::vector<std::string> forest_names();
 
 /// Poisson-disc points (Bridson 2007) in the square [0, side]^2, each then moved by Gaussian
 /// jitter, which may take it out of the square.

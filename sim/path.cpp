@@ -96,6 +96,12 @@ std::optional<PathKind> path_kind(std::string_view name) {
   return std::nullopt;
 }
 
+std::vector<std::string> path_names() {
+  std::vector<std::string> names;
+  for (const auto& [value, name] : kPathNames) names.emplace_back(name);
+  return names;
+}
+
 std::vector<geometry::SE2> make_path(const PathParameters& parameters) {
   std::vector<geometry::SE2> poses;
   geometry::SE2 segment_start;

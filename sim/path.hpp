@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -34,6 +35,8 @@ struct PathParameters {
 std::string_view to_string(PathKind kind);
 /// By name, e.g. "figure-eight"; none for another.
 std::optional<PathKind> path_kind(std::string_view name);
+/// All names that path_kind() takes.
+std::vector<std::string> path_names();
 
 /// The poses of the vehicle (x forward) in the frame of the first, at every observation. A step
 /// that reaches a corner spends what is left of it rotating, metres as radians, and vice versa.

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -53,8 +54,10 @@ enum class StemWay {
   kThereAndBack,  ///< A random way, and back on it.
   kWander,        ///< Through random points, crossing itself.
 };
-/// "laps", "there-and-back", "wander"; none for another.
+/// By name, e.g. "there-and-back"; none for another.
 std::optional<StemWay> stem_way(std::string_view name);
+/// All names that stem_way() takes.
+std::vector<std::string> stem_way_names();
 
 /// A way of about `length_m` [m] inside the forest, 8 m from its edges; laps and the way back lie
 /// about a metre beside each other. The same seed gives the same way. Throws std::runtime_error

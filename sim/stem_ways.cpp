@@ -1,9 +1,12 @@
 // make_stem_way and fit_stem_way of sim/stem_frames.hpp.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "sim/point_grid.hpp"
 #include "sim/random_streams.hpp"
@@ -19,6 +22,11 @@ constexpr double kRoundingM = 8.0;
 constexpr double kBesideM = 1.0;
 constexpr int kCorners = 7;
 constexpr int kMostDraws = 20000;
+
+constexpr std::array<std::pair<StemWay, std::string_view>, 3> kWayNames{
+    {{StemWay::kLaps, "laps"},
+     {StemWay::kThereAndBack, "there-and-back"},
+     {StemWay::kWander, "wander"}}};
 
 using WayPoints = std::vector<Eigen::Vector2d>;
 
@@ -155,10 +163,16 @@ WayPoints there_and_back_points(const WayBox& box, double length_m, std::mt19937
 }  // namespace
 
 std::optional<StemWay> stem_way(std::string_view name) {
-  if (name == "laps") return StemWay::kLaps;
-  if (name == "there-and-back") return StemWay::kThereAndBack;
-  if (name == "wander") return StemWay::kWander;
+  for (const auto& [value, known] : kWayNames) {
+    if (known == name) return value;
+  }
   return std::nullopt;
+}
+
+std::vector<std::string> stem_way_names() {
+  std::vector<std::string> names;
+  for (const auto& [value, name] : kWayNames) names.emplace_back(name);
+  return names;
 }
 
 Route make_stem_way(StemWay kind, const Forest& forest, double length_m, std::uint64_t seed) {

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "common/io/text_file.hpp"
@@ -25,6 +27,8 @@ sim::Scenario forest_scenario(const SensorSimulationOptions& options) {
   if (!kind) wrong_usage(fmt::format("--forest {}: no such forest", options.forest));
   const auto path = sim::path_kind(options.path);
   if (!path) wrong_usage(fmt::format("--path {}: no such path", options.path));
+  if (*path == sim::PathKind::kStationary)
+    wrong_usage("--path stationary: for ideal landmarks alone; --standstill stands with sensors");
   parameters.forest = sim::forest_parameters(*kind);
   parameters.path = *path;
   parameters.length_m = options.length_m;
@@ -45,31 +49,46 @@ sim::Scenario pole_scenario(const SensorSimulationOptions& options) {
   return std::move(*result.scenario);
 }
 
+struct SensorWorld {
+  std::string_view name;
+  sim::Scenario (*scenario)(const SensorSimulationOptions& options);
+};
+constexpr std::array<SensorWorld, 4> kSensorWorlds{
+    {{"forest3d", forest_scenario},
+     {"urban",
+      [](const SensorSimulationOptions& o) { return sim::urban_scenario(o.laps, o.seed); }},
+     {"urban-countryside",
+      [](const SensorSimulationOptions& o) {
+        return sim::urban_to_countryside_scenario(o.length_m, o.seed);
+      }},
+     {"countryside", [](const SensorSimulationOptions& o) {
+        return sim::countryside_scenario(o.length_m, o.seed);
+      }}}};
+
 sim::Scenario scenario_of(const SensorSimulationOptions& options) {
-  if (options.world == "forest3d") return forest_scenario(options);
-  if (options.world == "urban") return sim::urban_scenario(options.laps, options.seed);
-  if (options.world == "urban-countryside") {
-    return sim::urban_to_countryside_scenario(options.length_m, options.seed);
-  }
-  if (options.world == "countryside") {
-    return sim::countryside_scenario(options.length_m, options.seed);
-  }
-  return pole_scenario(options);
+  const auto* const world = std::ranges::find(kSensorWorlds, options.world, &SensorWorld::name);
+  return world != kSensorWorlds.end() ? world->scenario(options) : pole_scenario(options);
 }
 
+struct Laser {
+  std::string_view name;
+  sim::LidarModel model;
+  int columns;
+};
+constexpr std::array<Laser, 4> kLasers{{{"vlp16", sim::LidarModel::kVlp16, 1800},
+                                        {"vlp32", sim::LidarModel::kVlp32, 1800},
+                                        {"hdl32", sim::LidarModel::kHdl32, 2160},
+                                        {"hdl64", sim::LidarModel::kHdl64, 2048}}};
+constexpr std::string_view kNoLaser = "none";
+
 std::optional<sim::LidarParameters> lidar_of(const std::string& name) {
-  if (name == "none") return std::nullopt;
+  if (name == kNoLaser) return std::nullopt;
+  const auto* const laser = std::ranges::find(kLasers, name, &Laser::name);
+  if (laser == kLasers.end()) wrong_usage(fmt::format("--lidar {}: no such model", name));
   sim::LidarParameters lidar;
-  const auto use = [&](sim::LidarModel model, int columns) {
-    lidar.elevations_rad = sim::beam_elevations_rad(model);
-    lidar.columns = columns;
-    return lidar;
-  };
-  if (name == "vlp16") return use(sim::LidarModel::kVlp16, 1800);
-  if (name == "vlp32") return use(sim::LidarModel::kVlp32, 1800);
-  if (name == "hdl32") return use(sim::LidarModel::kHdl32, 2160);
-  if (name == "hdl64") return use(sim::LidarModel::kHdl64, 2048);
-  wrong_usage(fmt::format("--lidar {}: no such model", name));
+  lidar.elevations_rad = sim::beam_elevations_rad(laser->model);
+  lidar.columns = laser->columns;
+  return lidar;
 }
 
 truth_landmark_t truth_landmark(std::size_t id, const Eigen::Vector2d& position_m, double radius_m,
@@ -86,8 +105,21 @@ truth_landmark_t truth_landmark(std::size_t id, const Eigen::Vector2d& position_
 }  // namespace
 
 bool is_sensor_world(std::string_view world) {
-  return world == "forest3d" || world == "urban" || world == "urban-countryside" ||
-         world == "countryside" || world.starts_with(kPoles);
+  return std::ranges::find(kSensorWorlds, world, &SensorWorld::name) != kSensorWorlds.end() ||
+         world.starts_with(kPoles);
+}
+
+std::vector<std::string> sensor_worlds() {
+  std::vector<std::string> names;
+  for (const SensorWorld& world : kSensorWorlds) names.emplace_back(world.name);
+  return names;
+}
+
+std::vector<std::string> lidar_names() {
+  std::vector<std::string> names;
+  for (const Laser& laser : kLasers) names.emplace_back(laser.name);
+  names.emplace_back(kNoLaser);
+  return names;
 }
 
 sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/wire/convert.hpp"
 #include "sim/scenarios.hpp"
@@ -29,9 +30,13 @@ struct SensorSimulationOptions {
   std::uint64_t seed = 1;
 };
 
-/// Whether the name is a world with sensors: forest3d, urban, urban-countryside, countryside,
+/// Whether the name is a world with sensors: one of sensor_worlds(), or
 /// poles:POLES.csv,TRAJECTORY.csv
 bool is_sensor_world(std::string_view world);
+/// The names of worlds with sensors.
+std::vector<std::string> sensor_worlds();
+/// The names of lasers, "none" among them.
+std::vector<std::string> lidar_names();
 
 /// The drive that the options describe. Fails (see failure.hpp) where a name is unknown or a file
 /// cannot be read.

@@ -161,7 +161,9 @@ void add_changes_simulation(CLI::App& sim) {
       "One path through an unchanged and several changed copies of a world, as a data set of "
       "keypoints, LIDAR and IMU with the truth of what changed");
   auto options = std::make_shared<ChangesOptions>();
-  command->add_option("--world", options->world, "forest, office, station")->capture_default_str();
+  command->add_option("--world", options->world, "The place")
+      ->check(CLI::IsMember(changes::scene_names()))
+      ->capture_default_str();
   command->add_option("--out", options->out, "The folder to write; new or empty")->required();
   command->add_option("--copies", options->copies, "Changed copies beside the unchanged one")
       ->check(CLI::Range(1, 100))

@@ -245,8 +245,9 @@ void add_landmark_options(CLI::App& command, SimOptions& options) {
 void add_sensor_options(CLI::App& command, SimOptions& options) {
   auto& sensors = options.sensors;
   const std::string group = "With sensors";
-  command.add_option("--forest", sensors.forest, "forest3d: dense, intermediate, sparse")
+  command.add_option("--forest", sensors.forest, "Density of the trunks in forest3d")
       ->group(group)
+      ->check(CLI::IsMember(sim::forest_names()))
       ->capture_default_str();
   command.add_option("--distance", sensors.length_m, "To drive [m]; `urban` has its own")
       ->group(group)
@@ -268,8 +269,9 @@ void add_sensor_options(CLI::App& command, SimOptions& options) {
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
 
-  command.add_option("--lidar", sensors.lidar, "vlp16, vlp32, hdl32, hdl64, none")
+  command.add_option("--lidar", sensors.lidar, "Model of the laser")
       ->group(group)
+      ->check(CLI::IsMember(lidar_names()))
       ->capture_default_str();
   command.add_flag("--planar-laser", sensors.planar_laser, "A one-plane laser as well")
       ->group(group);
@@ -290,16 +292,19 @@ void add_sim_command(CLI::App& parent) {
   auto* command = parent.add_subcommand(
       "sim", "A simulated drive with ground truth, onto the bus or into a log");
   auto options = std::make_shared<SimOptions>();
-  command->add_option("world", options->world,
-                      "Ideal landmarks: dense, intermediate, sparse, or a CSV file with "
-                      "x_m,y_m[,dbh_m]. Sensors: forest3d, urban, urban-countryside, countryside, "
-                      "poles:POLES.csv,TRAJECTORY.csv");
+  command->add_option(
+      "world", options->world,
+      fmt::format("Ideal landmarks: {}, or a CSV file with x_m,y_m[,dbh_m]. Sensors: {}, "
+                  "poles:POLES.csv,TRAJECTORY.csv",
+                  fmt::join(sim::forest_names(), ", "), fmt::join(sensor_worlds(), ", ")));
   command->add_option("--out", options->out, "Write this log instead of sending on the bus");
   command->add_option("--lcm-url", options->lcm_url,
                       "LCM URL of the bus, e.g. udpm://239.255.76.67:7667?ttl=0");
   command
       ->add_option("--path", options->path,
-                   "circle, line, figure-eight, square, triangle, double-circle, meander, standing")
+                   "Shape of the path, of ideal landmarks and forest3d; stationary: ideal "
+                   "landmarks alone")
+      ->check(CLI::IsMember(sim::path_names()))
       ->capture_default_str();
   add_landmark_options(*command, *options);
 

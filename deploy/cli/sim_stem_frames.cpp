@@ -149,9 +149,10 @@ void add_stem_frames_simulation(CLI::App& sim) {
                       "out");
   command->add_option("--out", options->out, "The folder to write")->required();
   command
-      ->add_option("--path", options->path,
-                   "laps, there-and-back, wander, or a recorded way (CSV with x_m,y_m, or TUM), "
-                   "shrunk to the map")
+      ->add_option(
+          "--path", options->path,
+          fmt::format("{}, or a recorded way (CSV with x_m,y_m, or TUM), shrunk to the map",
+                      fmt::join(sim::stem_way_names(), ", ")))
       ->capture_default_str();
   command->add_option("--length", options->length_m, "Of the path, where it is not recorded [m]")
       ->check(CLI::Range(20.0, 1e5))

@@ -86,6 +86,8 @@ std::optional<SceneKind> scene_kind(std::string_view name) {
   return kind_of_name<SceneKind>(kSceneNames, name);
 }
 
+std::vector<std::string> scene_names() { return {kSceneNames.begin(), kSceneNames.end()}; }
+
 Thing moved(Thing thing, const Eigen::Vector3d& by_m) {
   for (Part& part : thing.parts) std::visit(PartMover{by_m}, part);
   thing.extent.centre_m += by_m;

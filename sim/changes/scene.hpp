@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -73,6 +74,8 @@ enum class SceneKind : std::uint8_t { kForest, kOffice, kStation };
 std::string_view to_string(SceneKind kind);
 /// The kind of this name; none for another.
 std::optional<SceneKind> scene_kind(std::string_view name);
+/// All names that scene_kind() takes.
+std::vector<std::string> scene_names();
 
 /// All things and the ground below them.
 struct Scene {

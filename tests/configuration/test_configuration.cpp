@@ -155,6 +155,32 @@ TEST_CASE("the bounds of every parameter are allowed, and so is its default", "[
   }
 }
 
+TEST_CASE("every choice of a parameter that help names starts its service", "[configuration]") {
+  std::size_t choices = 0;
+  for (const bus::Service& service : every_service()) {
+    const Described described(service);
+    for (const bus::ParameterTable::Entry& entry : described.table.entries()) {
+      const auto* text = std::get_if<bus::ParameterTable::Text>(&entry.target);
+      if (text == nullptr) continue;
+      for (const std::string& choice : text->choices) {
+        CAPTURE(service.name, entry.key, choice);
+        bus::MemoryBus bus;
+        const std::string toml = entry.key + " = \"" + choice + "\"\n";
+        std::string refused;
+        try {
+          const bus::HostedService hosted(service, bus, bus::no_clock(), toml, "toy.toml");
+        } catch (const bus::ConfigurationError& error) {
+          refused = error.what();
+        }
+        // Some need a file beside the choice; its key is named.
+        CHECK_THAT(refused, !Catch::Matchers::Contains(entry.key));
+        ++choices;
+      }
+    }
+  }
+  CHECK(choices > 20);
+}
+
 TEST_CASE("every service binds the channels that it declares", "[configuration]") {
   for (const bus::Service& service : every_service()) {
     CAPTURE(service.name);

@@ -2,6 +2,7 @@
 // and packets that are damaged, missing or of another model do no harm.
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "common/io/data_error.hpp"
 #include "common/packets/survey.hpp"
@@ -314,4 +315,23 @@ TEST_CASE("descriptions that cannot be are refused by name", "[packets]") {
   CHECK_THAT(problem({"xt32", heading + "1,2,3\n", "a.csv"}), Contains("31 of 32 channels"));
   CHECK_THAT(problem({"xt32", heading + "33,2,3\n", "a.csv"}), Contains("a.csv, line 2"));
   CHECK_THAT(problem({"xt32", heading + "1,x,3\n", "a.csv"}), Contains("a.csv, line 2"));
+}
+
+TEST_CASE("every model that is named is known, and some need a file") {
+  std::stringstream names(known_models());
+  std::size_t count = 0;
+  for (std::string model; std::getline(names, model, ',');) {
+    model.erase(0, model.find_first_not_of(' '));
+    CAPTURE(model);
+    ++count;
+    std::string refused;
+    try {
+      make_decoder({model, "", "none.txt"});
+    } catch (const io::DataError& error) {
+      refused = error.what();
+    }
+    CHECK_THAT(refused, !Catch::Matchers::Contains("is none of"));
+  }
+  CHECK(count >= 16);
+  CHECK_THROWS_WITH(make_decoder({"vlp17", "", ""}), Catch::Matchers::Contains("is none of"));
 }

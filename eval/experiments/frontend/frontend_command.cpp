@@ -162,11 +162,18 @@ void add_frontend_experiment(CLI::App& eval) {
   options->data = data != nullptr ? data : "../shared/data";
   command->add_option("--data", options->data, "Folder with pole_maps; default $UNDERSTORY_DATA");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
-  command->add_option(
-      "--only", options->sections,
-      "extraction, forest-plots, tracking, filter, chain, faults, or the beginning of a chain "
-      "drive's name (forest, urban, country, poles); only where it is named: mismatch (the filter "
-      "on a vehicle that sways, and sensors that err, by 0.5 and 2 times what it takes them for)");
+  command
+      ->add_option("--only", options->sections,
+                   "Parts of it, or drives of the chain (forest, urban, country, poles). Run only "
+                   "where named: "
+                   "planar (a laser with one plane while the vehicle turns), limit (the chain "
+                   "beside the batch "
+                   "solution), mismatch (the filter where sway and errors of the sensors are 0.5 "
+                   "and 2 times "
+                   "what it takes them for)")
+      ->check(
+          CLI::IsMember({"extraction", "forest-plots", "tracking", "filter", "chain", "faults",
+                         "forest", "urban", "country", "poles", "planar", "limit", "mismatch"}));
   command->add_flag("!--no-plots", options->plots, "No plots");
 
   command->callback([options] { run_guarded("frontend", [options] { run(*options); }); });
