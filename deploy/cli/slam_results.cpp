@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <utility>
 
+#include "common/factor_graph/files/g2o_writer.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/truth_track.hpp"
 #include "understory/ground_truth_t.hpp"
@@ -14,8 +16,10 @@
 namespace understory::cli {
 namespace {
 
-void append_edge(std::string& out, const model::Keyframe& keyframe, std::size_t index,
-                 std::uint64_t landmark_vertex) {
+constexpr int kDigits = 9;  ///< Of a number in graph.g2o: a micrometre in a kilometre.
+
+void add_edge(factor_graph::files::G2oWriter& out, const model::Keyframe& keyframe,
+              std::size_t index, std::uint64_t landmark_vertex) {
   const auto& landmark = keyframe.landmarks.at(index);
   const geometry::SE2 base_T_centre = keyframe.centre_T_base().inverse();
   const Eigen::Vector2d in_base = base_T_centre * landmark.position_m;
@@ -31,9 +35,8 @@ void append_edge(std::string& out, const model::Keyframe& keyframe, std::size_t 
   if (!(determinant > 0.0)) return;
 
   const Eigen::Matrix2d information = covariance.inverse();
-  fmt::format_to(std::back_inserter(out), "EDGE_SE2_XY {} {} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}\n",
-                 keyframe.sequence, landmark_vertex, in_base.x(), in_base.y(), information(0, 0),
-                 information(0, 1), information(1, 1));
+  const std::array<std::uint64_t, 2> vertices{keyframe.sequence, landmark_vertex};
+  out.edge(factor_graph::graph::FactorKind::kPoint2, vertices, {in_base.data(), 2}, information);
 }
 
 /// A message of either channel of the existence tracker.
@@ -163,28 +166,26 @@ std::string keyframes_csv(const model::WholeMap& map) {
 }
 
 std::string to_g2o(const SlamResults& results) {
-  std::string out;
+  using factor_graph::graph::VariableType;
+  factor_graph::files::G2oWriter out(kDigits);
   const std::optional<model::WholeMap> whole = results.map.whole();
-  if (!whole) return out;
+  if (!whole) return out.take();
   const model::WholeMap& map = *whole;
 
   std::uint64_t next = 0;
   for (const auto& one : map.keyframes) {
-    fmt::format_to(std::back_inserter(out), "VERTEX_SE2 {} {:.9g} {:.9g} {:.9g}\n",
-                   one.keyframe_sequence, one.map_T_vehicle.x(), one.map_T_vehicle.y(),
-                   one.map_T_vehicle.theta());
+    const geometry::SE2& pose = one.map_T_vehicle;
+    const std::array<double, 3> value{pose.x(), pose.y(), pose.theta()};
+    out.vertex(VariableType::kPose2, one.keyframe_sequence, value);
     next = std::max(next, one.keyframe_sequence + 1);
   }
 
-  if (!map.keyframes.empty()) {
-    fmt::format_to(std::back_inserter(out), "FIX {}\n", map.keyframes.front().keyframe_sequence);
-  }
+  if (!map.keyframes.empty()) out.fix(map.keyframes.front().keyframe_sequence);
 
   std::map<model::LandmarkId, std::uint64_t> vertices;
   for (const auto& one : map.landmarks) {
     vertices[one.id] = next;
-    fmt::format_to(std::back_inserter(out), "VERTEX_XY {} {:.9g} {:.9g}\n", next++,
-                   one.position_m.x(), one.position_m.y());
+    out.vertex(VariableType::kPoint2, next++, {one.position_m.data(), 2});
   }
 
   for (const auto& update : results.updates) {
@@ -194,11 +195,11 @@ std::string to_g2o(const SlamResults& results) {
       const auto vertex = vertices.find(association.landmark_id);
       if (vertex == vertices.end()) continue;
       if (association.keyframe_landmark >= keyframe->second.landmarks.size()) continue;
-      append_edge(out, keyframe->second, association.keyframe_landmark, vertex->second);
+      add_edge(out, keyframe->second, association.keyframe_landmark, vertex->second);
     }
   }
 
-  return out;
+  return out.take();
 }
 
 }  // namespace understory::cli

@@ -1,10 +1,12 @@
 #include "common/factor_graph/files/graph_file.hpp"
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "common/factor_graph/batch/batch.hpp"
+#include "common/factor_graph/files/g2o_writer.hpp"
 #include "tests/catch.hpp"
 #include "tests/data.hpp"
 
@@ -167,6 +169,33 @@ TEST_CASE("What is written reads back as the same graph", "[graph_file]") {
   fill(again, require_graph(written));
   REQUIRE(factor_graph::files::write_g2o(again) == written);
   REQUIRE(again.chi2() == Approx(graph.chi2()).epsilon(1e-12));
+}
+
+TEST_CASE("A g2o file has the digits that are asked for, and no line for what it has no tag for",
+          "[graph_file]") {
+  using factor_graph::files::G2oWriter;
+  using factor_graph::graph::FactorKind;
+  using factor_graph::graph::VariableType;
+  const std::array<double, 3> pose{1.0 / 3.0, 2e9, -0.5};
+  const std::array<double, 2> point{1.0 / 3.0, 4.0};
+  const std::array<std::uint64_t, 2> ends{7, 8};
+  const Eigen::Matrix2d information{{1.0 / 3.0, 0.25}, {0.25, 100.0}};
+
+  G2oWriter nine(9);
+  CHECK(nine.vertex(VariableType::kPose2, 7, pose));
+  CHECK(nine.vertex(VariableType::kPoint2, 8, point));
+  nine.fix(7);
+  CHECK(nine.edge(FactorKind::kPoint2, ends, point, information));
+  CHECK_FALSE(nine.vertex(VariableType::kScalar, 9, point));
+  CHECK_FALSE(nine.edge(FactorKind::kPriorPose2, ends, pose, information));
+  CHECK(nine.take() ==
+        "VERTEX_SE2 7 0.333333333 2e+09 -0.5\nVERTEX_XY 8 0.333333333 4\nFIX 7\n"
+        "EDGE_SE2_XY 7 8 0.333333333 4 0.333333333 0.25 100\n");
+  CHECK(nine.take().empty());
+
+  G2oWriter all;
+  all.vertex(VariableType::kPoint2, 8, point);
+  CHECK(all.take() == "VERTEX_XY 8 0.3333333333333333 4\n");
 }
 
 TEST_CASE("The batch solver finds the published optima", "[graph_file][recorded]") {
