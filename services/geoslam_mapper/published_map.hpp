@@ -1,0 +1,90 @@
+// The map as its subscribers have it, and when they are sent which part of it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/model/slam_output.hpp"
+#include "common/model/submap.hpp"
+#include "services/geoslam_mapper/map_budget.hpp"
+#include "services/geoslam_mapper/mapper_method.hpp"
+
+namespace understory::geoslam_mapper {
+
+/// Numbers the versions of the map and decides when MAP is sent without a
+/// request: at once where another map begins, soon where the map starts or
+/// jumps as a whole, else within the budget. A pure function of the keyframes
+/// and of the bytes that were sent.
+class PublishedMap {
+ public:
+  /// Limits of what is told; ranges and meanings:
+  /// describe(MapperOutputParameters&).
+  struct Limits {
+    double moved_m = 0.001;
+    double reset_distance_m = 0.5;
+    double map_share = 0.1;
+  };
+
+  /// No map so far.
+  explicit PublishedMap(const Limits& limits) : limits_(limits), budget_(limits.map_share) {}
+
+  /// Number of the map; 0 before the first keyframe and without a given map.
+  std::uint32_t map_id() const { return map_id_; }
+  /// Stamp of the newest keyframe.
+  model::Utime utime() const { return utime_; }
+  /// What a subscriber of every MAP_DELTA has, in order of id.
+  const std::vector<model::MapLandmark>& landmarks() const { return landmarks_; }
+  /// Whether a keyframe began another map than the last one's.
+  bool is_another(const model::MapUpdate& update) const {
+    return map_id_ != 0 && map_id_ != update.map_id;
+  }
+
+  /// The mapper starts with these landmarks, in order of id and at least one.
+  void begin_with(std::vector<model::MapLandmark> landmarks);
+  /// The next keyframe: what the subscribers must be told of it, if anything.
+  /// `mapper` has taken it. O(changed * log(map)) where the mapper tracks
+  /// changes, else O(map).
+  std::optional<model::MapDelta> on_update(const model::MapUpdate& update, MapperMethod& mapper);
+  /// The mapper gave a submap away: it changes no more, and nobody is told that
+  /// it went. O(map).
+  void give_away(const model::Submap& submap);
+  /// The mapper has that submap again.
+  void take_back(const model::Submap& submap) { keyframes_ += submap.keyframes.size(); }
+
+  /// Bytes that were sent on other channels.
+  void earn(std::size_t bytes) { budget_.earn(bytes); }
+  /// Whether the map has changed since MAP was sent.
+  bool has_changed() const { return !is_sent_; }
+  /// Whether MAP is to be sent now, without a request.
+  bool is_due() const;
+  /// MAP was sent without a request, with so many bytes.
+  void sent(std::size_t bytes);
+  /// The message for MAP. Poses are known no better than the mapper states.
+  model::WholeMap whole(const MapperMethod& mapper) const;
+
+  /// Members of a saved state; see common/state. The limits are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.utime_, self.version_, self.map_id_, self.landmarks_, self.budget_, self.is_sent_,
+      self.must_send_, self.keyframes_);
+  }
+
+ private:
+  model::MapDelta difference(const model::MapUpdate& update, MapperMethod& mapper) const;
+
+  Limits limits_;
+  MapBudget budget_;
+  model::Utime utime_ = 0;
+  std::uint64_t version_ = 0;
+  std::uint32_t map_id_ = 0;
+  std::vector<model::MapLandmark> landmarks_;
+  bool is_sent_ = true;
+  bool must_send_ = false;  ///< It started or jumped since it was last sent.
+  std::uint64_t keyframes_ = 0;
+};
+
+/// Bytes of a MAP with so many parts.
+std::size_t map_bytes(std::size_t landmarks, std::size_t keyframes);
+
+}  // namespace understory::geoslam_mapper
