@@ -39,12 +39,12 @@ class Forest {
     existence_tracker::TrackerParameters parameters;
     parameters.model.range_m = kRangeM;
     tracker_ = existence_tracker::ExistenceTracker(parameters);
-    tracker_.take(map_);
+    tracker_.on_map(map_);
     see_all();
     const auto states = tracker_.take_states();
     tracker_ = existence_tracker::ExistenceTracker(parameters);
     tracker_.begin_with(states);
-    tracker_.take(map_);
+    tracker_.on_map(map_);
     draw_missed();
   }
 
@@ -60,7 +60,7 @@ class Forest {
         if (std::hypot(one.position_m.x() - place_m_, one.position_m.y()) <= kRangeM)
           look(one.id, update);
     update.inliers = 10;
-    benchmark::DoNotOptimize(tracker_.add(update));
+    benchmark::DoNotOptimize(tracker_.on_update(update));
   }
 
  private:
@@ -86,7 +86,7 @@ class Forest {
           {static_cast<std::uint32_t>(update.associations.size()), one.id});
     for (int i = 0; i < 5; ++i) {
       update.utime = utime_ += 1'000'000;
-      tracker_.add(update);
+      tracker_.on_update(update);
     }
     utime_ += 30 * 86'400'000'000;
   }

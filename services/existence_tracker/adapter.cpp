@@ -73,18 +73,18 @@ class TrackerAdapter : public bus::Adapter {
     const bus::SubscribeOptions options{
         .queue_size = 200, .most_bytes = 2 * wire::bytes_with<map_t, map_landmark_t>(landmarks)};
     node.subscribe<model::WholeMap>(
-        channels_.map, [this](const model::WholeMap& map) { stage_->take(map); }, options);
+        channels_.map, [this](const model::WholeMap& map) { stage_->on_map(map); }, options);
     node.subscribe<model::MapDelta>(
-        channels_.map_delta, [this](const model::MapDelta& delta) { stage_->take(delta); },
+        channels_.map_delta, [this](const model::MapDelta& delta) { stage_->on_delta(delta); },
         options);
     node.subscribe<model::MapUpdate>(channels_.slam_update,
-                                     [this](const model::MapUpdate& update) { add(update); },
+                                     [this](const model::MapUpdate& update) { on_update(update); },
                                      {.queue_size = 500});
   }
 
-  void add(const model::MapUpdate& update) {
+  void on_update(const model::MapUpdate& update) {
     const TrackerCounters before = stage_->counters();
-    const auto existence = stage_->add(update);
+    const auto existence = stage_->on_update(update);
     if (!existence) return;
     existence_.publish(*existence);
     log(*existence, before);

@@ -10,8 +10,6 @@ namespace understory::existence_tracker {
 namespace {
 
 constexpr std::size_t kStatesPerMessage = 200;
-/// A step that no vehicle drives between two keyframes is a correction of the map [m].
-constexpr double kLongestStepM = 50.0;
 /// Looks from nearer or farther are none: the map is wrong there [m].
 constexpr float kNearestM = 0.05F;
 constexpr float kFarthestM = 1e4F;
@@ -43,69 +41,67 @@ bool has_place(const model::MapUpdate& update) {
 }  // namespace
 
 ExistenceTracker::ExistenceTracker(const TrackerParameters& parameters)
-    : parameters_(parameters), model_(parameters.model), need_(parameters.need) {}
+    : parameters_(parameters),
+      need_(parameters.need),
+      lessons_(parameters.model),
+      use_(parameters.use),
+      news_(parameters.output) {}
 
 void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states) {
-  existence::ExistenceModel model = model_;
-  BirthCounts births_so_far;
-  if (!states.empty()) decode(states.back().model, model, births_so_far);
-  std::map<model::LandmarkId, TrackedPoint> points;
-  std::uint32_t unused = 0;
+  Lessons lessons = lessons_;
+  lessons.begin_anew();
+  if (!states.empty()) lessons.take(states.back().model);
+  PointsById points;
   for (const model::ExistenceState& state : states) {
     for (std::size_t i = 0; i < state.landmarks.size(); ++i) {
       const model::LandmarkExistence& one = state.landmarks[i];
-      TrackedPoint tracked = decode(model, state.state_of(i), one.is_in_use);
+      TrackedPoint tracked = decode(lessons.model(), state.state_of(i), one.is_in_use);
       tracked.told_probability = one.probability;
       points.insert_or_assign(one.id, tracked);
     }
   }
 
-  // Who holds the map does not know yet which are not in use.
-  touched_.clear();
-  for (const auto& [id, tracked] : points) {
-    if (tracked.is_in_use) continue;
-    touched_.push_back(id);
-    ++unused;
+  news_.begin_anew();
+  use_.begin_anew();
+  for (auto& [id, tracked] : points) {
+    lessons.restore(id, tracked, false);  // What P of each follows is its own.
+    use_.add(tracked);
+    // Who holds the map does not know yet which are not in use.
+    if (!tracked.is_in_use) news_.touch(id);
   }
-  model_ = model;
-  births_so_far_ = births_so_far;
+  lessons_ = std::move(lessons);
   points_ = std::move(points);
-  histories_ = {};
-  changed_.clear();
-  due_.clear();
-  ++learned_times_;  // What P of each follows is its own.
-  for (auto& [id, tracked] : points_) changed_.push_back(id);
-  unused_ = unused;
-  begins_drive_ = true;
+  last_.begins_drive = true;
   need_.know(points_.size());
 }
 
 void ExistenceTracker::pass_time(model::Utime utime, TrackedPoint& tracked) const {
   const double seconds = 1e-6 * static_cast<double>(utime - tracked.looked_utime);
-  if (seconds > 0.0) tracked.point.elapse(model_, model_.elapsed(seconds));
+  if (seconds > 0.0) tracked.point.elapse(lessons_.model(), lessons_.model().elapsed(seconds));
   tracked.looked_utime = std::max(tracked.looked_utime, utime);
 }
 
-void ExistenceTracker::take(const model::WholeMap& map) {
+void ExistenceTracker::on_map(const model::WholeMap& map) {
   places_.take(map);
   wants_map_ = wants_map_ && !map.complete;
   give_birth();
 }
 
-void ExistenceTracker::take(const model::MapDelta& delta) {
+void ExistenceTracker::on_delta(const model::MapDelta& delta) {
   places_.take(delta);
   give_birth();
 }
 
-std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& update) {
+std::optional<model::Existence> ExistenceTracker::on_update(const model::MapUpdate& update) {
   if (!has_place(update)) return std::nullopt;
-  utime_ = update.utime;
-  map_id_ = update.map_id;
-  if (std::exchange(begins_drive_, false)) begin_drive(update.utime);
+  last_.utime = update.utime;
+  last_.map_id = update.map_id;
+  if (std::exchange(last_.begins_drive, false)) begin_drive(update.utime);
   drive_to(update);
   forget(update);
 
-  // What was seen, and what was not. New landmarks wait until it is known where they are.
+  // What was seen, and what was not. New landmarks wait until it is known where
+  // they are.
   const Eigen::Vector2d vehicle_m = update.map_T_vehicle.translation();
   std::vector<model::LandmarkId> added = update.added;
   std::ranges::sort(added);
@@ -122,23 +118,20 @@ std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& up
   return tell(update);
 }
 
-/// A pass is a way through a place: after so much path the next one begins.
 void ExistenceTracker::drive_to(const model::MapUpdate& update) {
-  const Eigen::Vector2d now_m = update.map_T_vehicle.translation();
-  if (last_m_) along_m_ += std::min(kLongestStepM, (now_m - *last_m_).norm());
-  last_m_ = now_m;
-  need_.drive_to(along_m_);
+  path_.drive_to(update.map_T_vehicle.translation());
+  need_.drive_to(path_.along_m());
   learn_on_the_way();
-  if (along_m_ - pass_began_m_ < parameters_.looks.pass_m) return;
-  model_.begin_pass();
-  pass_began_m_ = along_m_;
+  if (path_.of_pass_m() < parameters_.looks.pass_m) return;
+  lessons_.model().begin_pass();
+  path_.begin_pass();
 }
 
 void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ray,
                             const model::MapUpdate& update) {
   const auto place_m = places_.at(id);
   if (!place_m) {
-    ++counters_.without_place;
+    ++looks_.without_place;
     wants_map_ = true;
     return;
   }
@@ -147,30 +140,30 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
 
   TrackedPoint& tracked = known(id, update.utime);
   judge(id, tracked);
-  change(id, tracked);
+  lessons_.change(id, tracked);
   pass_time(update.utime, tracked);
   const double before = tracked.point.probability();
   const bool was_in_use = tracked.is_in_use;
   look->goes_on = goes_on(tracked, update.utime);
   if (!look->goes_on) {
-    count_false(tracked);
+    lessons_.count_false(tracked, parameters_.use.drop_below);
     if (tracked.is_first_pass) need_.know(1);
     tracked.is_first_pass = tracked.has_just_left = false;
   }
   if (is_hit) {
-    confirm(tracked);
-    tracked.point.hit(model_, *look);
-    ++counters_.hits;
+    lessons_.confirm(tracked);
+    tracked.point.hit(lessons_.model(), *look);
+    ++looks_.hits;
   } else {
-    tracked.point.miss(model_, *look);
-    ++counters_.misses;
-    counters_.blocked += ray == existence::Ray::kBlocked ? 1 : 0;
-    counters_.clear += ray == existence::Ray::kPassed ? 1 : 0;
+    tracked.point.miss(lessons_.model(), *look);
+    ++looks_.misses;
+    looks_.blocked += ray == existence::Ray::kBlocked ? 1 : 0;
+    looks_.clear += ray == existence::Ray::kPassed ? 1 : 0;
   }
-  make_due(id, tracked);
-  if (ray == existence::Ray::kBlocked) take_back(tracked);
-  decide(tracked);
-  touched_.push_back(id);
+  news_.make_due(id, tracked);
+  if (ray == existence::Ray::kBlocked) use_.take_back(tracked, may_be_used(tracked));
+  use_.decide(tracked, may_be_used(tracked));
+  news_.touch(id);
 
   // What is known to be gone, or was hidden, is not missing.
   if (is_hit || (was_in_use && ray != existence::Ray::kBlocked))
@@ -181,34 +174,36 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
 void ExistenceTracker::count_need(model::LandmarkId id, const TrackedPoint& tracked, bool is_hit,
                                   double before) {
   const bool is_new =
-      tracked.is_first_pass && along_m_ - tracked.pass_began_m < parameters_.need.window_m;
+      tracked.is_first_pass && path_.along_m() - tracked.pass_began_m < parameters_.need.window_m;
   const double now = tracked.is_in_use ? tracked.point.probability() : 0.0;
   if (is_new) {
-    need_.look_at_new(id, is_hit, now, along_m_);
+    need_.look_at_new(id, is_hit, now, path_.along_m());
   } else {
-    need_.look_for(id, is_hit, before, along_m_);
+    need_.look_for(id, is_hit, before, path_.along_m());
   }
 }
 
-/// Whether the landmark's pass goes on: one in view where the vehicle's pass ends is not looked at
-/// in two of them, nor is one that a drive comes back to: lanes side by side see it or miss it for
-/// one reason, and say nothing of how often another drive does.
+/// Whether the landmark's pass goes on: one in view where the vehicle's pass
+/// ends is not looked at in two of them, nor is one that a drive comes back to:
+/// lanes side by side see it or miss it for one reason, and say nothing of how
+/// often another drive does.
 bool ExistenceTracker::goes_on(TrackedPoint& tracked, model::Utime utime) const {
   const LookParameters& looks = parameters_.looks;
-  const bool is_in_view = along_m_ - tracked.looked_m < looks.same_pass_m &&
-                          along_m_ - tracked.pass_began_m < looks.pass_m;
+  const bool is_in_view = path_.along_m() - tracked.looked_m < looks.same_pass_m &&
+                          path_.along_m() - tracked.pass_began_m < looks.pass_m;
   const double since_s =
       1e-6 * (static_cast<double>(utime) - static_cast<double>(tracked.pass_began_utime));
-  tracked.looked_m = along_m_;
+  tracked.looked_m = path_.along_m();
   if (is_in_view || since_s < looks.pass_s) return true;
-  tracked.pass_began_m = along_m_;
+  tracked.pass_began_m = path_.along_m();
   tracked.pass_began_utime = utime;
   return false;
 }
 
 /// The landmark's point; of a given map it is new here.
 TrackedPoint& ExistenceTracker::known(model::LandmarkId id, model::Utime utime) {
-  const auto [found, is_new] = points_.try_emplace(id, TrackedPoint{Point::known(model_), utime});
+  const auto [found, is_new] =
+      points_.try_emplace(id, TrackedPoint{Point::known(lessons_.model()), utime});
   if (!is_new) return found->second;
   begin(id, found->second);
   // It was in the map before this drive.
@@ -217,94 +212,71 @@ TrackedPoint& ExistenceTracker::known(model::LandmarkId id, model::Utime utime) 
   return found->second;
 }
 
-/// A point that is new here: it follows what is known.
+/// A point that is new here.
 void ExistenceTracker::begin(model::LandmarkId id, TrackedPoint& tracked) {
-  tracked.judged_by = model_.learned().before;
-  tracked.judged_times = learned_times_;
-  tracked.is_among_histories = false;
-  changed_.push_back(id);
-  due_.push_back(id);
+  lessons_.begin(id, tracked);
+  news_.begin(id);
 }
 
-void ExistenceTracker::make_due(model::LandmarkId id, TrackedPoint& tracked) {
-  if (!std::exchange(tracked.state_is_due, true)) due_.push_back(id);
-}
-
-/// Seen by another pass than the one that found it.
-void ExistenceTracker::confirm(TrackedPoint& tracked) {
-  if (tracked.is_confirmed || tracked.is_first_pass) return;
-  tracked.is_confirmed = true;
-  births_so_far_.confirmed += 1.0;
-}
-
-/// Looked for by another pass that is over, and improbable. In its first pass nothing counts:
-/// nothing can be confirmed there either.
-void ExistenceTracker::count_false(TrackedPoint& tracked) {
-  if (tracked.is_confirmed || tracked.is_first_pass || tracked.is_counted) return;
-  if (tracked.point.probability() >= parameters_.use.drop_below) return;
-  tracked.is_counted = true;
-  births_so_far_.false_ones += 1.0;
-}
-
-/// Landmarks whose first sighting is some keyframes old get their probability now.
+/// Landmarks whose first sighting is some keyframes old get their probability
+/// now.
 void ExistenceTracker::give_birth() {
   std::erase_if(births_, [&](const Birth& birth) {
     const auto place_m = places_.at(birth.id);
     if (!place_m) return false;
     const auto look = look_from(birth.vehicle_m, *place_m, existence::Ray::kUnknown);
     if (!look) return true;
-    TrackedPoint born{Point::born(model_, *look), birth.utime};
+    TrackedPoint born{Point::born(lessons_.model(), *look), birth.utime};
     born.is_first_pass = true;
     born.is_confirmed = false;
-    born.looked_m = born.pass_began_m = along_m_;
+    born.looked_m = born.pass_began_m = path_.along_m();
     born.pass_began_utime = birth.utime;
     const auto [found, is_new] = points_.try_emplace(birth.id, born);
     if (is_new) {
       begin(birth.id, found->second);
-      decide(found->second);
+      use_.decide(found->second, may_be_used(found->second));
     }
-    touched_.push_back(birth.id);
+    news_.touch(birth.id);
     return true;
   });
 }
 
-void ExistenceTracker::forget(const model::MapUpdate& update) {
-  const auto erase = [&](model::LandmarkId id) {
-    std::erase_if(births_, [&](const Birth& birth) { return birth.id == id; });
-    const auto found = points_.find(id);
-    if (found == points_.end()) return;
-    if (!found->second.is_in_use) --unused_;
-    if (found->second.is_among_histories) found->second.point.take_back(histories_);
-    points_.erase(found);
-  };
-  for (const model::LandmarkId id : update.removed) erase(id);
+void ExistenceTracker::erase(model::LandmarkId id) {
+  std::erase_if(births_, [&](const Birth& birth) { return birth.id == id; });
+  const auto found = points_.find(id);
+  if (found == points_.end()) return;
+  use_.erase(found->second);
+  lessons_.forget(found->second);
+  points_.erase(found);
+}
 
-  // Two names of one thing: what speaks for it counts.
-  for (const auto& [old_id, new_id] : update.merged) {
-    const auto before = points_.find(old_id);
-    if (before == points_.end()) {
-      erase(old_id);  // It was not born yet.
-      continue;
-    }
-    judge(old_id, before->second);
-    const auto after = points_.find(new_id);
-    if (after == points_.end()) {
-      TrackedPoint moved = before->second;
-      erase(old_id);
-      if (!moved.is_in_use) ++unused_;
-      moved.state_is_due = true;
-      begin(new_id, points_.emplace(new_id, moved).first->second);
-      continue;
-    }
-    judge(new_id, after->second);
-    if (before->second.point.log_odds() > after->second.point.log_odds()) {
-      change(new_id, after->second);
-      after->second.point = before->second.point;
-      make_due(new_id, after->second);
-      decide(after->second);
-    }
+void ExistenceTracker::forget(const model::MapUpdate& update) {
+  for (const model::LandmarkId id : update.removed) erase(id);
+  for (const auto& [old_id, new_id] : update.merged) merge(old_id, new_id);
+}
+
+/// Two names of one thing: what speaks for it counts.
+void ExistenceTracker::merge(model::LandmarkId old_id, model::LandmarkId new_id) {
+  const auto before = points_.find(old_id);
+  if (before == points_.end()) return erase(old_id);  // It was not born yet.
+  judge(old_id, before->second);
+  const auto after = points_.find(new_id);
+  if (after == points_.end()) {
+    TrackedPoint moved = before->second;
     erase(old_id);
+    use_.add(moved);
+    moved.state_is_due = true;
+    return begin(new_id, points_.emplace(new_id, moved).first->second);
   }
+
+  judge(new_id, after->second);
+  if (before->second.point.log_odds() > after->second.point.log_odds()) {
+    lessons_.change(new_id, after->second);
+    after->second.point = before->second.point;
+    news_.make_due(new_id, after->second);
+    use_.decide(after->second, may_be_used(after->second));
+  }
+  erase(old_id);
 }
 
 model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
@@ -312,15 +284,16 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
   existence.utime = update.utime;
   existence.map_id = update.map_id;
   existence.known = static_cast<std::uint32_t>(points_.size());
-  existence.unused = unused_;
+  existence.unused = use_.unused();
   // Beyond what drives have missed, not what this one misses.
-  const double usual = model_.learned().before;
-  const double recall = usual > 0.0 ? usual : model_.recall().of_pass();
+  const existence::ExistenceModel& model = lessons_.model();
+  const double usual = model.learned().before;
+  const double recall = usual > 0.0 ? usual : model.recall().of_pass();
   existence.missing_share = need_.missing_share(recall);
   existence.new_share = need_.new_share();
   existence.is_mapping_needed = need_.is_needed(recall);
 
-  for (const model::LandmarkId id : ids_to_tell()) {
+  for (const model::LandmarkId id : news_.take_ids(points_)) {
     TrackedPoint& tracked = points_.at(id);
     judge(id, tracked);
     tracked.told_probability = tracked.point.probability();
@@ -332,47 +305,26 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
   return existence;
 }
 
-/// What this keyframe added is told at once, before it is known where it is: else it would be in
-/// use until the next keyframe, and after a drive's last one until the next drive.
+/// What this keyframe added is told at once, before it is known where it is:
+/// else it would be in use until the next keyframe, and after a drive's last
+/// one until the next drive.
 void ExistenceTracker::tell_new(model::Utime utime, model::Existence& existence) const {
   for (const Birth& birth : births_)
     if (birth.utime == utime && !points_.contains(birth.id))
-      existence.landmarks.push_back({birth.id, model_.birth(), are_new_ones_used()});
+      existence.landmarks.push_back(
+          {birth.id, lessons_.model().birth(), lessons_.are_new_ones_used()});
   std::ranges::sort(existence.landmarks, {}, &model::LandmarkExistence::id);
-}
-
-/// What changed, and some of the others: who missed a message has all of them in the end.
-std::set<model::LandmarkId> ExistenceTracker::ids_to_tell() {
-  std::set<model::LandmarkId> ids;
-  for (const model::LandmarkId id : std::exchange(touched_, {})) {
-    const auto found = points_.find(id);
-    if (found == points_.end()) continue;  // Born since the last keyframe, and merged by this one.
-    const TrackedPoint& tracked = found->second;
-    const double change = std::abs(tracked.point.probability() - tracked.told_probability);
-    if (change > parameters_.output.told_change || tracked.is_in_use != tracked.was_told_in_use)
-      ids.insert(id);
-  }
-
-  auto next = points_.upper_bound(repeated_);
-  for (int i = 0; i < parameters_.output.repeated && !points_.empty(); ++i, ++next) {
-    if (next == points_.end()) next = points_.begin();
-    ids.insert(next->first);
-    repeated_ = next->first;
-  }
-  return ids;
 }
 
 std::vector<model::ExistenceState> ExistenceTracker::take_states() {
   std::vector<model::ExistenceState> messages;
-  std::vector<model::LandmarkId> ids = std::exchange(due_, {});
-  std::ranges::sort(ids);
-  for (const model::LandmarkId id : ids) {
+  for (const model::LandmarkId id : news_.take_due()) {
     const auto found = points_.find(id);
     if (found == points_.end() || !std::exchange(found->second.state_is_due, false)) continue;
     TrackedPoint& tracked = found->second;
     judge(id, tracked);
     if (messages.empty() || messages.back().landmarks.size() == kStatesPerMessage) {
-      messages.push_back({utime_, 0, map_id_, {}, encode(model_, births_so_far_), {}});
+      messages.push_back({last_.utime, 0, last_.map_id, {}, lessons_.encoded(), {}});
       messages.back().landmarks.reserve(kStatesPerMessage);
     }
     messages.back().landmarks.push_back({id, tracked.point.probability(), tracked.is_in_use});
@@ -386,8 +338,8 @@ std::optional<model::LandmarkExistence> ExistenceTracker::of(model::LandmarkId i
   if (found == points_.end()) return std::nullopt;
   const TrackedPoint& tracked = found->second;
   Point point = tracked.point;
-  if (tracked.judged_times != learned_times_) {
-    existence::ExistenceModel model = model_;
+  if (!lessons_.is_judged(tracked)) {
+    existence::ExistenceModel model = lessons_.model();
     point.reconsider(model, tracked.judged_by);
   }
   return model::LandmarkExistence{id, point.probability(), tracked.is_in_use};

@@ -39,10 +39,10 @@ void disturb(Road& road, model::MapUpdate& update, ExistenceTracker& tracker) {
     one.id = road.add(update.map_T_vehicle.translation() + Eigen::Vector2d(3.0, 5.0));
     one.position_m = update.map_T_vehicle.translation() + Eigen::Vector2d(3.0, 5.0);
     update.added = {one.id};
-    tracker.add(update);
+    tracker.on_update(update);
     model::MapDelta delta;
     delta.added = {one};
-    tracker.take(delta);
+    tracker.on_delta(delta);
   }
 }
 
@@ -52,12 +52,12 @@ TEST_CASE("Histories that are kept are those of a recount", "[existence]") {
   for (const std::uint64_t seed : {41, 42, 43, 44}) {
     Road road(seed, 80);
     auto tracker = std::make_unique<ExistenceTracker>(for_short_passes());
-    tracker->take(road.map());
+    tracker->on_map(road.map());
     for (int day = 0; day < 4; ++day) {
       if (day > 0) {
         auto next = std::make_unique<ExistenceTracker>(for_short_passes());
         next->begin_with(tracker->take_states());
-        next->take(road.map());
+        next->on_map(road.map());
         tracker = std::move(next);
       }
       const auto missed = road.draw(0.1 * static_cast<double>(seed % 3) + 0.2);
@@ -66,7 +66,7 @@ TEST_CASE("Histories that are kept are those of a recount", "[existence]") {
       };
       for (model::MapUpdate& update : road.drive(day * kDay_us, is_seen)) {
         disturb(road, update, *tracker);
-        tracker->add(update);
+        tracker->on_update(update);
         CAPTURE(seed, day, update.keyframe_sequence);
         REQUIRE(tracker->histories() == tracker->recount());
       }
@@ -79,8 +79,8 @@ TEST_CASE("A tracker that counts all anew before each keyframe says the same", "
   Road road(45, 80);
   ExistenceTracker tracker(for_short_passes());
   ExistenceTracker anew(for_short_passes());
-  tracker.take(road.map());
-  anew.take(road.map());
+  tracker.on_map(road.map());
+  anew.on_map(road.map());
   for (int day = 0; day < 3; ++day) {
     const auto missed = road.draw(0.3);
     const auto is_seen = [&](model::LandmarkId id) { return !missed.contains(id); };
@@ -88,7 +88,7 @@ TEST_CASE("A tracker that counts all anew before each keyframe says the same", "
       ExistenceTracker loaded(for_short_passes());
       loaded.load(anew.save());
       anew = std::move(loaded);
-      const auto kept = tracker.add(update), counted = anew.add(update);
+      const auto kept = tracker.on_update(update), counted = anew.on_update(update);
       REQUIRE(wire::encode_message(*kept) == wire::encode_message(*counted));
     }
   }

@@ -28,7 +28,7 @@ TrackerParameters for_trees() {
 std::unique_ptr<ExistenceTracker> next_drive(ExistenceTracker& tracker, const Road& road) {
   auto next = std::make_unique<ExistenceTracker>(for_trees());
   next->begin_with(tracker.take_states());
-  next->take(road.map());
+  next->on_map(road.map());
   return next;
 }
 
@@ -47,16 +47,16 @@ TEST_CASE("Drives that miss two thirds of the landmarks take none out of use", "
   for (const std::uint64_t seed : {31, 32, 33}) {
     Road road(seed);
     auto tracker = std::make_unique<ExistenceTracker>(for_trees());
-    tracker->take(road.map());
+    tracker->on_map(road.map());
     for (const model::MapUpdate& update : road.drive(0, [](model::LandmarkId) { return true; }))
-      tracker->add(update);
+      tracker->on_update(update);
 
     for (int day = 1; day <= 4; ++day) {
       tracker = next_drive(*tracker, road);
       const auto missed = road.draw(0.66);
       const auto is_seen = [&](model::LandmarkId id) { return !missed.contains(id); };
       for (const model::MapUpdate& update : road.drive(6 * kYear_us + day * kDay_us, is_seen))
-        tracker->add(update);
+        tracker->on_update(update);
       CAPTURE(seed, day);
       CHECK(count_unused(road, *tracker) == 0);
     }

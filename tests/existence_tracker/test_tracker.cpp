@@ -25,13 +25,13 @@ TrackerParameters for_road() {
 ExistenceTracker next_day(ExistenceTracker& tracker, const Road& road) {
   ExistenceTracker next(for_road());
   next.begin_with(tracker.take_states());
-  next.take(road.map());
+  next.on_map(road.map());
   return next;
 }
 
 model::Existence drive(const std::vector<model::MapUpdate>& updates, ExistenceTracker& tracker) {
   std::optional<model::Existence> last;
-  for (const model::MapUpdate& update : updates) last = tracker.add(update);
+  for (const model::MapUpdate& update : updates) last = tracker.on_update(update);
   return last.value();
 }
 
@@ -50,7 +50,7 @@ TEST_CASE("What is gone leaves use, what is missed by chance stays", "[existence
     Road road(seed);
     const auto all_seen = [&](model::LandmarkId) { return road.chance(0.85); };
     ExistenceTracker tracker(for_road());
-    tracker.take(road.map());
+    tracker.on_map(road.map());
     drive(road.drive(0, all_seen), tracker);
 
     // A fifth is felled; of the others each drive misses a fifth altogether.
@@ -81,7 +81,7 @@ TEST_CASE("A landmark that was missed on two drives is in use after one good pas
   for (const std::uint64_t seed : {4, 5, 6}) {
     Road road(seed);
     ExistenceTracker tracker(for_road());
-    tracker.take(road.map());
+    tracker.on_map(road.map());
     drive(road.drive(0, [&](model::LandmarkId) { return true; }), tracker);
     const auto missed = road.draw(0.1);
     for (int day = 1; day <= 2; ++day) {
@@ -102,7 +102,7 @@ TEST_CASE("Without a change next to nothing is removed", "[existence]") {
   for (const std::uint64_t seed : {7, 8, 9}) {
     Road road(seed);
     ExistenceTracker tracker(for_road());
-    tracker.take(road.map());
+    tracker.on_map(road.map());
     for (int day = 0; day < 6; ++day) {
       if (day > 0) tracker = next_day(tracker, road);
       const auto missed = road.draw(0.36);
@@ -129,7 +129,7 @@ TEST_CASE("Lanes of one drive see a landmark or miss it for one reason", "[exist
     for (const std::uint64_t seed : {21, 22, 23}) {
       Road road(seed);
       auto tracker = std::make_unique<ExistenceTracker>(parameters);
-      tracker->take(road.map());
+      tracker->on_map(road.map());
       const auto lane = [&](model::Utime utime, const std::set<model::LandmarkId>& missed) {
         drive(road.drive(utime, [&](model::LandmarkId id) { return !missed.contains(id); }),
               *tracker);
@@ -141,7 +141,7 @@ TEST_CASE("Lanes of one drive see a landmark or miss it for one reason", "[exist
       const auto states = tracker->take_states();
       tracker = std::make_unique<ExistenceTracker>(parameters);
       tracker->begin_with(states);
-      tracker->take(road.map());
+      tracker->on_map(road.map());
 
       const auto missed = road.draw(0.36);
       for (int k = 0; k < lanes_after; ++k) lane(30 * kDay_us + k * kLane_us, missed);
@@ -161,7 +161,7 @@ TEST_CASE("Lanes of one drive see a landmark or miss it for one reason", "[exist
 TEST_CASE("A mapping-needed signal where half of the map is another one", "[existence]") {
   Road road(10);
   ExistenceTracker tracker(for_road());
-  tracker.take(road.map());
+  tracker.on_map(road.map());
   drive(road.drive(0, [&](model::LandmarkId) { return road.chance(0.9); }), tracker);
   for (int day = 1; day <= 3; ++day) {
     tracker = next_day(tracker, road);
@@ -184,11 +184,11 @@ TEST_CASE("All who listen know every landmark in the end, and each message is so
           "[existence]") {
   Road road(11);
   ExistenceTracker tracker(for_road());
-  tracker.take(road.map());
+  tracker.on_map(road.map());
   std::map<model::LandmarkId, model::LandmarkExistence> held;
   for (const model::MapUpdate& update :
        road.drive(0, [&](model::LandmarkId) { return road.chance(0.7); })) {
-    const auto existence = tracker.add(update);
+    const auto existence = tracker.on_update(update);
     REQUIRE(existence);
     const auto back = wire::decode_message<model::Existence>(wire::encode_message(*existence));
     REQUIRE(back);
@@ -205,17 +205,17 @@ TEST_CASE("All who listen know every landmark in the end, and each message is so
 TEST_CASE("A saved tracker goes on as the other one, and states are the points", "[existence]") {
   Road road(12);
   ExistenceTracker tracker(for_road());
-  tracker.take(road.map());
+  tracker.on_map(road.map());
   const auto updates = road.drive(0, [&](model::LandmarkId) { return road.chance(0.6); });
   const std::size_t half = updates.size() / 2;
-  for (std::size_t i = 0; i < half; ++i) tracker.add(updates[i]);
+  for (std::size_t i = 0; i < half; ++i) tracker.on_update(updates[i]);
 
   ExistenceTracker loaded(for_road());
   loaded.load(tracker.save());
   CHECK(loaded.save() == tracker.save());
   for (std::size_t i = half; i < updates.size(); ++i) {
-    const auto a = tracker.add(updates[i]);
-    const auto b = loaded.add(updates[i]);
+    const auto a = tracker.on_update(updates[i]);
+    const auto b = loaded.on_update(updates[i]);
     REQUIRE(wire::encode_message(*a) == wire::encode_message(*b));
   }
 
@@ -259,12 +259,12 @@ TEST_CASE("Merged, removed and unknown landmarks", "[existence]") {
   ExistenceTracker tracker(for_road());
   auto updates = road.drive(0, [&](model::LandmarkId) { return true; });
   CHECK_FALSE(tracker.wants_map());
-  tracker.add(updates.front());
+  tracker.on_update(updates.front());
   CHECK(tracker.wants_map());
   CHECK(tracker.counters().without_place > 0);
-  tracker.take(road.map());
+  tracker.on_map(road.map());
   CHECK_FALSE(tracker.wants_map());
-  for (const model::MapUpdate& update : updates) tracker.add(update);
+  for (const model::MapUpdate& update : updates) tracker.on_update(update);
   REQUIRE(tracker.of(3));
 
   model::MapUpdate update = updates.back();
@@ -272,7 +272,7 @@ TEST_CASE("Merged, removed and unknown landmarks", "[existence]") {
   update.expected.clear();
   update.merged = {{3, 4}};
   update.removed = {5};
-  tracker.add(update);
+  tracker.on_update(update);
   CHECK_FALSE(tracker.of(3));
   CHECK_FALSE(tracker.of(5));
   CHECK(tracker.of(4)->probability > 0.9);
@@ -283,35 +283,35 @@ TEST_CASE("Merged, removed and unknown landmarks", "[existence]") {
     update.added = {id};
     update.merged.clear();
     update.removed.clear();
-    tracker.add(update);
-    if (is_placed) tracker.take(road.map());
+    tracker.on_update(update);
+    if (is_placed) tracker.on_map(road.map());
     update.added.clear();
     update.merged = {{id, 4}};
-    REQUIRE(tracker.add(update));
-    tracker.take(road.map());
+    REQUIRE(tracker.on_update(update));
+    tracker.on_map(road.map());
     CHECK_FALSE(tracker.of(id));
-    const auto told = tracker.add(updates.back());
+    const auto told = tracker.on_update(updates.back());
     CHECK(std::ranges::none_of(told->landmarks, [&](const auto& one) { return one.id == id; }));
   }
 
   // Without a place nothing counts.
   update.status = model::MapUpdateStatus::kNotSure;
-  CHECK_FALSE(tracker.add(update));
+  CHECK_FALSE(tracker.on_update(update));
 }
 
 TEST_CASE("A landmark that a keyframe sees and merges is the one that lives on", "[existence]") {
   Road road(13, 20);
   ExistenceTracker tracker(for_road());
-  tracker.take(road.map());
+  tracker.on_map(road.map());
   const auto updates = road.drive(0, [&](model::LandmarkId) { return true; });
-  for (const model::MapUpdate& update : updates) tracker.add(update);
+  for (const model::MapUpdate& update : updates) tracker.on_update(update);
 
   model::MapUpdate update = updates.back();
   update.expected.clear();
   update.associations = {{0, 3}, {1, 4}, {2, 6}};
   update.merged = {{6, 3}, {3, 4}};
   const std::uint64_t hits = tracker.counters().hits;
-  tracker.add(update);
+  tracker.on_update(update);
   CHECK_FALSE(tracker.of(3));
   CHECK_FALSE(tracker.of(6));
   CHECK(tracker.counters().hits == hits + 1);
@@ -320,7 +320,7 @@ TEST_CASE("A landmark that a keyframe sees and merges is the one that lives on",
 TEST_CASE("A false landmark of this drive leaves use when nobody sees it again", "[existence]") {
   Road road(14);
   ExistenceTracker tracker(for_road());
-  tracker.take(road.map());
+  tracker.on_map(road.map());
   drive(road.drive(0, [&](model::LandmarkId) { return road.chance(0.9); }), tracker);
   // A pedestrian stood there.
   const model::LandmarkId pedestrian = road.add({150.0, 6.0});
@@ -333,8 +333,8 @@ TEST_CASE("A false landmark of this drive leaves use when nobody sees it again",
       update.added.push_back(pedestrian);
       is_born = true;
     }
-    tracker.add(update);
-    tracker.take(model::MapDelta{});
+    tracker.on_update(update);
+    tracker.on_delta(model::MapDelta{});
   }
   REQUIRE(is_born);
   REQUIRE(tracker.of(pedestrian));
@@ -345,7 +345,7 @@ TEST_CASE("Where most of what is new is false, it is out of use from its first k
           "[existence]") {
   Road road(15);
   ExistenceTracker tracker(for_road());
-  tracker.take(road.map());
+  tracker.on_map(road.map());
   std::set<model::LandmarkId> pedestrians;
   const auto seen = [&](model::LandmarkId id) { return !pedestrians.contains(id); };
   drive(road.drive(0, seen), tracker);
@@ -358,14 +358,14 @@ TEST_CASE("Where most of what is new is false, it is out of use from its first k
           road.add(updates[i].map_T_vehicle.translation() + Eigen::Vector2d(0.0, 6.0));
       pedestrians.insert(pedestrian);
       updates[i].added.push_back(pedestrian);
-      const auto existence = tracker.add(updates[i]);
+      const auto existence = tracker.on_update(updates[i]);
       REQUIRE(existence);
       const auto told =
           std::ranges::find(existence->landmarks, pedestrian, &model::LandmarkExistence::id);
       REQUIRE(told != existence->landmarks.end());
       CHECK(told->is_in_use == (day < 3));
       CHECK(std::ranges::is_sorted(existence->landmarks, {}, &model::LandmarkExistence::id));
-      tracker.take(road.map());
+      tracker.on_map(road.map());
     }
   }
 }
@@ -394,7 +394,7 @@ TEST_CASE("What is hidden but for unknown edges stays in use, what is gone leave
   for (const std::uint64_t seed : {21, 22}) {
     Road road(seed);
     ExistenceTracker tracker(for_road());
-    tracker.take(road.map());
+    tracker.on_map(road.map());
     std::set<model::LandmarkId> left_by_mistake;
     const auto drive_without = [&](int day, const std::set<model::LandmarkId>& unseen,
                                    const std::set<model::LandmarkId>& hidden) {
@@ -403,7 +403,7 @@ TEST_CASE("What is hidden but for unknown edges stays in use, what is gone leave
       hide(hidden, road, updates);
       // The process ends in the middle of the passes, and goes on with what it saved.
       for (std::size_t i = 0; i < updates.size(); ++i) {
-        tracker.add(updates[i]);
+        tracker.on_update(updates[i]);
         for (const model::ExpectedLandmark& one : updates[i].expected)
           if (one.sight == model::LineOfSight::kBlocked && !tracker.of(one.id)->is_in_use)
             left_by_mistake.insert(one.id);
