@@ -1,4 +1,4 @@
-#include "services/viewer/scene.hpp"
+#include "services/viewer/known_truth.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -9,13 +9,10 @@ namespace {
 
 constexpr double kTruthEvery_m = 0.2;
 constexpr double kRedraw_m = 0.05;
-/// Of chi^2 with the 3 degrees of freedom of a pose, its 99.9 %: above it the covariance is said to
-/// be too small, until NEES is below kNeesBound again.
-constexpr double kTooSureNees = 16.3;
 
 }  // namespace
 
-void Scene::take_truth(model::Utime utime, const geometry::SE2& world_T_vehicle) {
+void KnownTruth::take(model::Utime utime, const geometry::SE2& world_T_vehicle) {
   // The newest one is kept whole, since poses are compared with it; of the others one in so much.
   const std::size_t size = world_truth_.size();
   if (size > 1 &&
@@ -30,7 +27,7 @@ void Scene::take_truth(model::Utime utime, const geometry::SE2& world_T_vehicle)
 }
 
 /// Between two that are near each other; none outside of what was heard.
-std::optional<geometry::SE2> Scene::truth_at(model::Utime utime) const {
+std::optional<geometry::SE2> KnownTruth::at(model::Utime utime) const {
   const auto after = std::ranges::lower_bound(world_truth_, utime, {},
                                               &std::pair<model::Utime, geometry::SE2>::first);
   if (after == world_truth_.end()) return std::nullopt;
@@ -43,38 +40,44 @@ std::optional<geometry::SE2> Scene::truth_at(model::Utime utime) const {
          geometry::SE2::Exp(part * (before->second.inverse() * after->second).Log());
 }
 
-void Scene::tie_to_truth(const model::MapUpdate& first) {
-  const auto world_T_vehicle = truth_at(first.utime);
+void KnownTruth::start_map() {
+  track_.clear();
+  pose_.changed(*changes_).reset();
+  alignment_.clear();
+  world_T_map_.reset();
+}
+
+void KnownTruth::tie(const model::MapUpdate& first) {
+  const auto world_T_vehicle = at(first.utime);
   world_T_map_.reset();
   if (world_T_vehicle) world_T_map_ = *world_T_vehicle * first.map_T_vehicle.inverse();
 }
 
-void Scene::compare_with_truth(const model::SlamPose& pose) {
-  const auto true_pose = truth_at(pose.utime);
-  if (!true_pose) return;
-  const geometry::SE2& world_T_vehicle = *true_pose;
+std::optional<TruthError> KnownTruth::compare(const model::SlamPose& pose) {
+  const auto world_T_vehicle = at(pose.utime);
+  if (!world_T_vehicle) return std::nullopt;
   const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
   if (pose.is_localised())
-    alignment_.add(map_T_vehicle.translation(), world_T_vehicle.translation());
+    alignment_.add(map_T_vehicle.translation(), world_T_vehicle->translation());
   const auto world_T_map = world_T_map_ ? world_T_map_ : alignment_.world_T_map();
-  if (!world_T_map) return;
+  if (!world_T_map) return std::nullopt;
 
-  const geometry::SE2 map_T_truth = world_T_map->inverse() * world_T_vehicle;
-  changed(true_pose_) = map_T_truth;
+  const geometry::SE2 map_T_truth = world_T_map->inverse() * *world_T_vehicle;
+  pose_.changed(*changes_) = map_T_truth;
+  draw(*world_T_map, map_T_vehicle);
+
   const Eigen::Vector3d error = (map_T_vehicle.inverse() * map_T_truth).Log();
-  SceneNumbers& numbers = changed(numbers_);
-  numbers.error_m = error.head<2>().norm();
-  numbers.error_rad = std::abs(error.z());
+  TruthError result{error.head<2>().norm(), std::abs(error.z()), std::nullopt,
+                    world_T_map_.has_value()};
   const Eigen::LLT<Eigen::Matrix3d> factor(pose.covariance);
-  if (factor.info() == Eigen::Success) numbers.nees = error.dot(factor.solve(error));
-  // The best fit of all poses is no truth: in a given map its own error would count for the pose's.
-  const bool is_tied = world_T_map_.has_value();
-  numbers.is_too_sure =
-      is_tied && numbers.nees && *numbers.nees > (numbers.is_too_sure ? kNeesBound : kTooSureNees);
+  if (factor.info() == Eigen::Success) result.nees = error.dot(factor.solve(error));
+  return result;
+}
 
-  // The path so far: drawn anew when the alignment has moved it by more than is seen.
+/// The path so far: drawn anew when the alignment has moved it by more than is seen.
+void KnownTruth::draw(const geometry::SE2& world_T_map, const geometry::SE2& map_T_vehicle) {
   const auto in_map = [&](const std::pair<model::Utime, geometry::SE2>& one) {
-    const geometry::SE2 at = world_T_map->inverse() * one.second;
+    const geometry::SE2 at = world_T_map.inverse() * one.second;
     return TrackPoint{one.first,
                       static_cast<float>(at.x()),
                       static_cast<float>(at.y()),
@@ -82,25 +85,25 @@ void Scene::compare_with_truth(const model::SlamPose& pose) {
                       0.0F,
                       0};
   };
-  const geometry::SE2 shift = drawn_world_T_map_.inverse() * *world_T_map;
+  const geometry::SE2 shift = drawn_world_T_map_.inverse() * world_T_map;
   const double reach_m = map_T_vehicle.translation().norm();
   const bool is_off = shift.translation().norm() + std::abs(shift.theta()) * reach_m > kRedraw_m;
-  if (is_off || truth_.points().empty()) {
-    drawn_world_T_map_ = *world_T_map;
+  if (is_off || track_.points().empty()) {
+    drawn_world_T_map_ = world_T_map;
     std::vector<TrackPoint> points;
     points.reserve(world_truth_.size());
     for (const auto& one : world_truth_) points.push_back(in_map(one));
-    truth_.replace_from(0, points);
-  } else if (world_truth_.back().first > truth_.points().back().utime) {
+    track_.replace_from(0, points);
+  } else if (world_truth_.back().first > track_.points().back().utime) {
     const TrackPoint newest = in_map(world_truth_.back());
-    const auto points = truth_.points();
+    const auto points = track_.points();
     const bool is_near =
         points.size() > 1 && std::hypot(points[points.size() - 2].x_m - newest.x_m,
                                         points[points.size() - 2].y_m - newest.y_m) < kTruthEvery_m;
     if (is_near) {
-      truth_.replace_last(newest);
+      track_.replace_last(newest);
     } else {
-      truth_.append(newest);
+      track_.append(newest);
     }
   }
 }
