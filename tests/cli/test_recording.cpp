@@ -207,7 +207,7 @@ TEST_CASE_METHOD(Fixture, "the Victoria Park set is imported as it is downloaded
   const fs::path archive = test::recording("victoria_park_raw/victoria_park_ascii.zip");
   import(archive.string());
   const auto events = events_of(log);
-  CHECK(events.size() == 7230 + 7228 + 61'763 + 948);
+  CHECK(events.size() == 1 + 7230 + 7228 + 61'763 + 948);
   check_holds(events, io::read_victoria_park(archive));
   check_order(events);
 }
