@@ -136,6 +136,7 @@ std::optional<ForestKind> forest_kind(std::string_view name) {
 
 std::vector<std::string> forest_names() {
   std::vector<std::string> names;
+  names.reserve(kForestNames.size());
   for (const auto& [value, name] : kForestNames) names.emplace_back(name);
   return names;
 }

@@ -98,6 +98,7 @@ std::optional<PathKind> path_kind(std::string_view name) {
 
 std::vector<std::string> path_names() {
   std::vector<std::string> names;
+  names.reserve(kPathNames.size());
   for (const auto& [value, name] : kPathNames) names.emplace_back(name);
   return names;
 }

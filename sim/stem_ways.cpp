@@ -171,6 +171,7 @@ std::optional<StemWay> stem_way(std::string_view name) {
 
 std::vector<std::string> stem_way_names() {
   std::vector<std::string> names;
+  names.reserve(kWayNames.size());
   for (const auto& [value, name] : kWayNames) names.emplace_back(name);
   return names;
 }
