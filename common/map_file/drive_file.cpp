@@ -57,7 +57,7 @@ ChangeNote note_of_drive(const Connection& connection) {
   const std::int64_t maps = connection.number("SELECT count(*) FROM understory_maps");
   const std::int64_t submaps =
       connection.number("SELECT count(*) FROM understory_submaps WHERE state != 'replaced'");
-  return {newest.value_or(0), "understory-submap_store", "a drive",
+  return {newest.value_or(0), "understory-submap-store", "a drive",
           fmt::format("{} maps, {} submaps", maps, submaps)};
 }
 
