@@ -77,6 +77,7 @@ void ShownPose::take(const model::SlamPose& pose, std::int64_t wall_us) {
 }
 
 std::optional<double> ShownPose::rate_hz() const {
+  if (times_us_.size() < 2) return std::nullopt;
   const double span_s = 1e-6 * static_cast<double>(times_us_.back() - times_us_.front());
   if (span_s <= 0.0) return std::nullopt;
   return static_cast<double>(times_us_.size() - 1) / span_s;

@@ -62,7 +62,8 @@ harness::ChainRun drive_through(const fs::path& folder, bool laser_of_one_plane)
     suite.planar_laser.emplace();
     suite.planar_laser->rate_hz = 5.0;
     suite.planar_laser->revolution_s = 0.0;  // as the recording says
-    suite.planar_laser->vehicle_T_sensor = axle_T_vehicle * Eigen::Translation3d(0.0, 0.0, 0.8);
+    suite.planar_laser->vehicle_T_sensor = axle_T_vehicle * numbers.mount("planar");
+    suite.planar_laser->vehicle_T_sensor.translation().z() = 0.8;
   } else {
     suite.imu->vehicle_T_sensor = axle_T_vehicle * numbers.mount("imu");
     suite.lidar->vehicle_T_sensor = axle_T_vehicle * numbers.mount("lidar");

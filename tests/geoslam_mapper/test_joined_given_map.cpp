@@ -142,6 +142,32 @@ TEST_CASE("Behind a gap one tree beside those of the given map does not tie the 
   CHECK(landmarks <= 80);  // One in each drive is new.
 }
 
+TEST_CASE("A drive in a given map is found again behind a stretch without odometry",
+          "[given_map]") {
+  constexpr int kLast = 40;
+  constexpr int kNext = 140;  // 200 m on
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    CAPTURE(seed);
+    Road road(seed, 300);
+    std::vector<model::MapLandmark> given = road.given(-kRange_m);
+    for (model::MapLandmark& one : given) one.covariance_m2 = 2.5e-3 * Eigen::Matrix2d::Identity();
+    SmoothingMapper mapper(with_odometry());
+    mapper.start_with(given);
+    std::uint32_t map_id = 0;
+    for (int i = 0; i <= kLast; ++i) {
+      if (i > 0) mapper.add(road.odometry(i));
+      map_id = mapper.add(road.keyframe(i)).map_id;
+    }
+    for (int i = kNext; i < kNext + 5; ++i) {
+      if (i > kNext) mapper.add(road.odometry(i));
+      const model::MapUpdate update = mapper.add(road.keyframe(i));
+      CHECK(update.status == model::MapUpdateStatus::kUpdated);
+      CHECK(update.map_id == map_id);
+      CHECK((update.map_T_vehicle.translation() - Road::position_m(i)).norm() < 0.1);
+    }
+  }
+}
+
 TEST_CASE("Behind a gap a given map that was joined is met again, and not doubled", "[rejoining]") {
   int joined = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {

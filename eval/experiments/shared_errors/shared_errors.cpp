@@ -201,6 +201,7 @@ void run_shared_errors(const SharedErrorsOptions& options) {
   const nlohmann::json config{{"seed", options.seed},
                               {"runs", options.runs},
                               {"config", options.config},
+                              {"recorded", options.recorded},
                               {"odometry_percent", options.inputs.odometry_percent},
                               {"odometry_deg", options.inputs.odometry_deg},
                               {"sigma_m", options.inputs.sigma_m},

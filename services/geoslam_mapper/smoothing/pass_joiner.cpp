@@ -38,18 +38,21 @@ double misfit(const std::vector<MergedPair>& pairs, const GlobalMap& map, bool j
 
 /// A landmark of the given map as it was told.
 struct Given {
-  model::LandmarkId id = 0;
+  model::LandmarkId id = 0;  ///< That it counts as now.
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
 };
 
-/// Takes those of the pairs that no keyframe saw yet into the graph; gives those that stay.
+/// Takes those of the pairs that no keyframe saw yet into the graph.
 std::vector<Given> enter_given(const std::vector<MergedPair>& pairs, GlobalMap& map) {
   std::vector<Given> given;
   for (const auto& [old_id, new_id] : pairs) {
-    if (map.landmarks.at(old_id).is_given_unseen()) map.enter_given(old_id);
-    if (!map.landmarks.at(new_id).is_given_unseen()) continue;
-    map.enter_given(new_id);
-    given.push_back({new_id, map.landmarks.at(new_id).position_m});
+    for (const model::LandmarkId id : {old_id, new_id}) {
+      const StoredLandmark& landmark = map.landmarks.at(id);
+      if (!landmark.is_given_unseen()) continue;
+      map.enter_given(id);
+      given.push_back({new_id, landmark.position_m, landmark.prior_covariance});
+    }
   }
   return given;
 }
@@ -59,7 +62,7 @@ double misfit(const std::vector<Given>& given, const GlobalMap& map) {
   double sum = 0.0;
   for (const Given& one : given) {
     const Eigen::Vector2d off_m = *map.graph.position(one.id) - one.position_m;
-    sum += off_m.dot(map.landmarks.at(one.id).prior_covariance.inverse() * off_m);
+    sum += off_m.dot(one.covariance_m2.inverse() * off_m);
   }
   return sum;
 }

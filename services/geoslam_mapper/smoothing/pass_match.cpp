@@ -113,8 +113,6 @@ Scene scene_around(const model::FieldOfView& field_of_view, NodeIndex node, cons
     const bool is_given = pass.is_given && landmark.is_given_unseen();
     if (!is_given && !map.graph.position(id) && !map.graph.is_dormant(id)) continue;
     if (is_seen_around(node, kAnotherPass_m, landmark, map.graph)) {
-      // Two of one given map are two.
-      if (pass.is_given && landmark.is_given()) continue;
       const double distance_m = (landmark.position_m - map_T_node.translation()).norm();
       if (distance_m < range_m) ours.emplace_back(distance_m, id);
     } else if (pass.is_given || is_seen_around(*pass.node, kOnePass_m, landmark, map.graph)) {
@@ -172,7 +170,9 @@ std::vector<MergedPair> match_passes(const Scene& scene,
     const double variance_m2 = laid[i].variance_m2 + (are_few ? said.variance_m2 : 0.0);
     const bool is_one = (are_few || said.variance_m2 <= kTellsPairs_m2) &&
                         said.apart_m.squaredNorm() <= kGoodFit * variance_m2 &&
-                        map.landmarks.at(ours).kind == map.landmarks.at(theirs).kind;
+                        map.landmarks.at(ours).kind == map.landmarks.at(theirs).kind &&
+                        // Two of one given map are two.
+                        !(map.landmarks.at(ours).is_given() && map.landmarks.at(theirs).is_given());
     if (is_one) pairs.push_back(Merges::in_order(ours, theirs, map.landmarks));
   }
   return pairs.size() < kFewestOfPass ? std::vector<MergedPair>{} : pairs;

@@ -38,13 +38,32 @@ constexpr double kNarrowGiven_m = 1.0;
 
 /// Whether the gate of a landmark that does not share the reference's error is so wide that another
 /// one may be meant. All of a pass are off together then.
-bool is_loose(const StoredLandmark& landmark, double gate_m, double gate_of_vehicle_m,
+bool is_loose(const StoredLandmark& landmark, double gate_m,
               const std::optional<Reference>& reference, int recent_keyframes,
               const Trajectory& trajectory) {
-  const bool is_wide = landmark.nodes.empty()
-                           ? gate_m > kNarrowGiven_m || gate_of_vehicle_m > kNarrow_m
-                           : gate_m > kNarrow_m;
-  return is_wide && !(reference && is_recent(landmark, *reference, recent_keyframes, trajectory));
+  const double narrow_m = landmark.nodes.empty() ? kNarrowGiven_m : kNarrow_m;
+  return gate_m > narrow_m &&
+         !(reference && is_recent(landmark, *reference, recent_keyframes, trajectory));
+}
+
+/// Where the vehicle is in the frame of the map, by the last keyframe. A graph that is not solved,
+/// since the map stays as it is, does not tell; there odometry's prediction does, and one by what
+/// the keyframer tracked, whose noise is assumed, counts as exact.
+geometry::SE2WithCovariance vehicle_in_map(const Prediction& prediction, const GlobalMap& map) {
+  if (!map.trajectory.bases().empty()) {
+    geometry::SE2WithCovariance last = map.graph.marginal(map.trajectory.last().node);
+    if (!last.covariance.isZero(0.0)) return last;
+  }
+  if (prediction.from_odometry) return prediction.map_T_centre;
+  return {prediction.map_T_centre.mean, Eigen::Matrix3d::Zero()};
+}
+
+/// What the pose of the vehicle leaves uncertain of where a place of the map is to it, per axis
+/// [m^2].
+double variance_from(const geometry::SE2WithCovariance& map_T_vehicle,
+                     const Eigen::Vector2d& place_m) {
+  const Eigen::Matrix<double, 2, 3> j = plane::linearise(map_T_vehicle.mean, place_m).pose;
+  return 0.5 * (j * map_T_vehicle.covariance * j.transpose()).trace();
 }
 
 /// The last keyframe; none where the map has none.
@@ -103,21 +122,30 @@ Eigen::Matrix3d without_guess(const Eigen::Matrix3d& registered, const Eigen::Ma
 Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
                                      const geometry::SE2WithCovariance& guess,
                                      const std::optional<Reference>& relative_to,
+                                     const std::optional<Prediction>& tracked,
                                      const GlobalMap& map) const {
   // The map's landmarks around the guess.
   std::vector<model::LandmarkId> ids = landmarks_in_view(keyframe, guess, map.landmarks);
-  const std::vector<double> variances =
+  std::vector<double> variances =
       relative_variances(ids, relative_to, parameters_.recent_keyframes, map);
   std::vector<geometry::UncertainPoint> reference;
   std::vector<model::LandmarkId> loose;
+  std::optional<geometry::SE2WithCovariance> vehicle;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const StoredLandmark& landmark = map.landmarks.at(ids[i]);
     const auto gate_m = [&](double variance_m2) {
       return parameters_.gate_sigmas * std::sqrt(variance_m2) + parameters_.gate_floor_m;
     };
-    const double of_vehicle_m2 = std::max(0.0, variances[i] - landmark.local_variance());
-    if (is_loose(landmark, gate_m(variances[i]), gate_m(of_vehicle_m2), relative_to,
-                 parameters_.recent_keyframes, map.trajectory)) {
+    // One of the given map that no keyframe saw lies in the frame of the map, as the vehicle does.
+    double of_vehicle_m2 = 0.0;
+    if (tracked && landmark.is_given_unseen()) {
+      if (!vehicle) vehicle = vehicle_in_map(*tracked, map);
+      of_vehicle_m2 = variance_from(*vehicle, landmark.position_m);
+      variances[i] += of_vehicle_m2;
+    }
+    if (gate_m(of_vehicle_m2) > kNarrow_m ||
+        is_loose(landmark, gate_m(variances[i]), relative_to, parameters_.recent_keyframes,
+                 map.trajectory)) {
       loose.push_back(ids[i]);
       continue;
     }
@@ -139,7 +167,8 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
   const geometry::Registration found = register_points(reference, observed, broad, gating);
 
   // Pairs of the same kind.
-  Placement placement{{found.reference_T_observed, found.covariance}, {}, true, std::move(loose)};
+  Placement placement{
+      {found.reference_T_observed, found.covariance}, {}, tracked.has_value(), std::move(loose)};
   for (const geometry::PointPair& pair : found.pairs) {
     const model::LandmarkId id = ids[pair.reference];
     if (keyframe.landmarks[pair.observed].kind != map.landmarks.at(id).kind) continue;
@@ -150,7 +179,8 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
 
 Tracking PlaceRecogniser::track(const model::Keyframe& keyframe, const Prediction& prediction,
                                 const GlobalMap& map) const {
-  Placement placement = associate(keyframe, prediction.map_T_centre, last_keyframe(map), map);
+  Placement placement =
+      associate(keyframe, prediction.map_T_centre, last_keyframe(map), prediction, map);
   const std::size_t possible =
       count_matchable(keyframe, placement.map_T_centre.mean, placement.loose, map.landmarks);
   const std::size_t matched = placement.associations.size();
@@ -180,8 +210,8 @@ SearchResult PlaceRecogniser::search(const model::Keyframe& keyframe, const Glob
 
   // Association around that pose, which rests on the same landmarks: they count once.
   const geometry::SE2WithCovariance guess{found.map_T_sensor, found.covariance};
-  result.placement = associate(keyframe, guess, seen_from(found.associations, map), map);
-  result.placement->by_prediction = false;
+  result.placement =
+      associate(keyframe, guess, seen_from(found.associations, map), std::nullopt, map);
   Eigen::Matrix3d& covariance = result.placement->map_T_centre.covariance;
   covariance = without_guess(covariance, guess.covariance);
   if (result.placement->associations.size() < static_cast<std::size_t>(parameters_.min_matched)) {

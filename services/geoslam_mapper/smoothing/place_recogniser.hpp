@@ -44,7 +44,8 @@ class PlaceRecogniser {
 
  private:
   Placement associate(const model::Keyframe& keyframe, const geometry::SE2WithCovariance& guess,
-                      const std::optional<Reference>& relative_to, const GlobalMap& map) const;
+                      const std::optional<Reference>& relative_to,
+                      const std::optional<Prediction>& tracked, const GlobalMap& map) const;
 
   SmoothingMapperParameters parameters_;
 };

@@ -58,22 +58,6 @@ std::size_t nearest_chosen(const OldLandmarks& old, const std::vector<std::size_
   return nearest;
 }
 
-/// Landmarks of the given map that no keyframe saw lie in the map's frame: how well the vehicle is
-/// known there comes on top.
-void add_vehicle_in_given_map(const std::vector<model::LandmarkId>& ids,
-                              const std::optional<Reference>& reference, const GlobalMap& map,
-                              std::vector<double>& variances) {
-  std::optional<Eigen::Matrix3d> of_node;
-  for (std::size_t i = 0; i < ids.size() && reference; ++i) {
-    const StoredLandmark& landmark = map.landmarks.at(ids[i]);
-    if (!landmark.is_given_unseen()) continue;
-    if (!of_node) of_node = map.graph.marginal(reference->node).covariance;
-    const Eigen::Matrix<double, 2, 3> j =
-        plane::linearise(map.graph.pose(reference->node), landmark.position_m).pose;
-    variances[i] += 0.5 * (j * *of_node * j.transpose()).trace();
-  }
-}
-
 }  // namespace
 
 bool is_recent(const StoredLandmark& landmark, const Reference& reference, int recent_keyframes,
@@ -100,7 +84,6 @@ std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids
     old.ids.push_back(id);
     old.places.push_back(place_of(landmark, map.graph));
   }
-  add_vehicle_in_given_map(ids, reference, map, variances);
   if (old.ids.empty()) return variances;
 
   // The exact variance of a few.

@@ -157,6 +157,14 @@ CensusAfterDrive after_drive(const harness::ChainRun& run, const LandmarkStems& 
   return after;
 }
 
+/// Each case of a call has its own.
+std::string case_name(const CensusOptions& options, std::uint64_t seed) {
+  return fmt::format("{}-missed-{:.0f}-{}-{}-seed-{}",
+                     options.forest.is_changed ? "change" : "control",
+                     100.0 * options.forest.pass_missed, options.use_ranges ? "ranges" : "blind",
+                     options.share_errors ? "shared" : "independent", seed);
+}
+
 History history_of(const std::vector<CensusStem>& stems, const ForestSetting& setting) {
   History history;
   history.mapping_drives = 1;
@@ -184,6 +192,7 @@ CensusRun run_census(const std::vector<CensusStem>& stems, const CensusOptions& 
   LandmarkStems names;
   std::vector<std::uint32_t> mapped;
   std::filesystem::path map;
+  if (!options.logs.empty()) std::filesystem::create_directories(options.logs);
   for (int k = 0; k <= setting.drives; ++k) {
     const bool is_later = k > 0 && setting.is_changed;
     const double time_s =
@@ -198,7 +207,7 @@ CensusRun run_census(const std::vector<CensusStem>& stems, const CensusOptions& 
     const auto kept = [&](const char* ending) {
       return options.logs.empty()
                  ? std::filesystem::path()
-                 : options.logs / fmt::format("seed-{}-drive-{}{}", seed, k, ending);
+                 : options.logs / fmt::format("{}-drive-{}{}", case_name(options, seed), k, ending);
     };
     harness::ChainRun run =
         drive_processes(drive, options, map, kept(".lcm"), path, names,
@@ -217,7 +226,9 @@ CensusRun run_census(const std::vector<CensusStem>& stems, const CensusOptions& 
       for (model::MapLandmark& landmark : run.landmarks) landmark.covariance_m2.setZero();
     map = scratch / ("drive-" + std::to_string(k) + ".gpkg");
     harness::write_drive_map(run, "census", map);
-    if (!options.logs.empty()) std::filesystem::copy_file(map, kept(".gpkg"));
+    if (!options.logs.empty())
+      std::filesystem::copy_file(map, kept(".gpkg"),
+                                 std::filesystem::copy_options::overwrite_existing);
   }
   return result;
 }
