@@ -142,6 +142,26 @@ TEST_CASE("Behind a gap one tree beside those of the given map does not tie the 
   CHECK(landmarks <= 80);  // One in each drive is new.
 }
 
+TEST_CASE("Behind a gap a map that stays as it is is met again", "[given_map]") {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    CAPTURE(seed);
+    Road road(seed, 300);
+    std::vector<model::MapLandmark> given = road.given(-kRange_m);
+    for (model::MapLandmark& one : given) one.covariance_m2 = 2.5e-3 * Eigen::Matrix2d::Identity();
+    SmoothingMapperParameters parameters = with_odometry();
+    parameters.localisation_only = true;
+    SmoothingMapper mapper(parameters);
+    mapper.start_with(given);
+    model::MapUpdate last;
+    for (int i = 0; i < kKeyframes; ++i) {
+      if (i > 0) mapper.add(road.odometry(i));
+      last = mapper.add(road.keyframe(i));
+    }
+    CHECK(last.associations.size() > 10);
+    CHECK((last.map_T_vehicle.translation() - Road::position_m(kKeyframes - 1)).norm() < 0.1);
+  }
+}
+
 TEST_CASE("A drive in a given map is found again behind a stretch without odometry",
           "[given_map]") {
   constexpr int kLast = 40;

@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <memory>
 #include <numeric>
-#include <optional>
 
-#include "common/io/lcm_log.hpp"
+#include "eval/harness/input_log.hpp"
 #include "eval/metrics/victoria_park_score.hpp"
 #include "sim/scenarios.hpp"
-#include "understory/ground_truth_t.hpp"
 
 namespace understory::eval::experiments::few_landmarks {
 namespace {
@@ -84,31 +82,6 @@ double mean(const std::vector<std::size_t>& values) {
   return values.empty() ? 0.0 : static_cast<double>(sum) / static_cast<double>(values.size());
 }
 
-/// Keeps the readings as they go into the chain.
-class Recorder {
- public:
-  explicit Recorder(const std::filesystem::path& file) {
-    if (!file.empty()) writer_.emplace(file);
-  }
-  void add(const harness::RawMessage& message) {
-    if (writer_) writer_->write(message.utime, message.channel, message.bytes);
-  }
-  void finish(const harness::ChainRun& run) {
-    if (!writer_) return;
-    ground_truth_t truth{};
-    for (const metrics::StampedPose& pose : run.truth) {
-      truth.utime = pose.utime;
-      truth.world_T_vehicle = wire::to_wire(pose.pose);
-      writer_->write(pose.utime, "GROUND_TRUTH", wire::encode_message(truth));
-      ++truth.seq;
-    }
-    writer_->commit();
-  }
-
- private:
-  std::optional<io::LcmLogWriter> writer_;
-};
-
 }  // namespace
 
 FewLandmarksScore drive(const FewLandmarksDrive& plan, std::uint64_t seed,
@@ -117,7 +90,7 @@ FewLandmarksScore drive(const FewLandmarksDrive& plan, std::uint64_t seed,
   speed.cruise_mps = plan.speed_mps;
   speed.standstill_s = 2.0;
   sim::SensorDrive sensors(scenario_of(plan, seed), speed, suite_of(plan), seed);
-  Recorder recorder(plan.log);
+  harness::InputLog recorder(plan.log);
 
   harness::ChainOptions options;
   options.config_dir = plan.config_dir;
@@ -125,11 +98,12 @@ FewLandmarksScore drive(const FewLandmarksDrive& plan, std::uint64_t seed,
   options.without = {"existence_tracker", "loop_closer"};
   options.meddle = [&](harness::RawMessage message) {
     progress(1e-6 * static_cast<double>(message.utime) / sensors.motion().duration_s());
-    recorder.add(message);
+    recorder.add(message.utime, message.channel, message.bytes);
     return std::vector{std::move(message)};
   };
   const harness::ChainRun run = drive_chain(sensors, options);
-  recorder.finish(run);
+  for (const metrics::StampedPose& pose : run.truth) recorder.add_truth(pose.utime, pose.pose);
+  recorder.finish();
 
   FewLandmarksScore score;
   score.scans = run.detections.size();

@@ -14,6 +14,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "common/geometry/trajectory_error.hpp"
 #include "common/io/stem_frames.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
@@ -28,11 +29,6 @@
 
 namespace understory::eval::experiments::shared_errors {
 namespace {
-
-/// Of chi^2 with 3 degrees of freedom, between 2.5 and 97.5 %: what the mean NEES of a drive has
-/// where one error moves all its keyframes.
-constexpr double kBandLow = 0.216;
-constexpr double kBandHigh = 9.348;
 
 /// Of a walk that was recorded; simulated ones have the name of their errors.
 constexpr const char* kRecorded = "recorded";
@@ -57,6 +53,12 @@ SurveyedDrive drive_named(const std::string& name) {
   return *found;
 }
 
+/// Whether the mean NEES of a drive is where it is in 95 % of drives in which one error moves all
+/// keyframes.
+bool is_in_band(double nees) {
+  return nees >= geometry::kNeesBandLow && nees <= geometry::kNeesBandHigh;
+}
+
 nlohmann::json row_of(const loops::LoopDrive& drive, const loops::LoopScore& score,
                       const loops::PathErrors& batch) {
   const loops::DriveFate& fate = score.fate;
@@ -73,7 +75,7 @@ nlohmann::json row_of(const loops::LoopDrive& drive, const loops::LoopScore& sco
           {"live_poses", fate.live_poses},
           {"nees", fate.nees},
           {"nees_within_95_pct", fate.within_95_pct},
-          {"nees_in_band", fate.nees >= kBandLow && fate.nees <= kBandHigh},
+          {"nees_in_band", is_in_band(fate.nees)},
           {"closures_sent", score.sent},
           {"closures_right", score.sent - score.sent_wrong},
           {"closures_accepted", score.accepted},
@@ -225,6 +227,7 @@ void add_shared_errors_experiment(CLI::App& eval) {
           "Which simulated drives; default six, none with --recorded. Beside the six there is "
           "longleaf-few, two or three stems a frame")
       ->delimiter(',');
+
   command
       .add_option("--recorded", options->recorded,
                   "Folders of recorded frames (frame_<n>.csv, trajectory.txt); runs draw the "
@@ -239,6 +242,7 @@ void add_shared_errors_experiment(CLI::App& eval) {
       .add_option("--truth-sigma-deg", *truth_sigma_deg,
                   "Standard deviation of recorded true headings; for NEES")
       ->check(CLI::Range(0.0, 90.0));
+
   command
       .add_option(
           "--errors", options->errors,
@@ -246,8 +250,10 @@ void add_shared_errors_experiment(CLI::App& eval) {
           "noise has the power of what is off")
       ->delimiter(',')
       ->check(CLI::IsMember({"shared", "along", "direction", "range", "independent"}));
+
   command.add_option("--config", options->config, "Configuration folder of the stages")
       ->capture_default_str();
+
   loops::add_noise_options(command, options->inputs);
   command.add_option("--runs", options->runs, "Drives through each map")
       ->check(CLI::Range(1, 10000))
@@ -258,6 +264,7 @@ void add_shared_errors_experiment(CLI::App& eval) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command.add_option("--json", options->json, "Result document");
+
   command.callback([options, truth_sigma_deg] {
     options->inputs.truth_sigma.heading_rad = *truth_sigma_deg * std::numbers::pi / 180.0;
     if (options->drives.empty() && options->recorded.empty())

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
 #include <random>
 #include <set>
 #include <string>
@@ -13,13 +12,12 @@
 
 #include "common/bus/config_layers.hpp"
 #include "common/bus/launch_config.hpp"
-#include "common/io/lcm_log.hpp"
 #include "common/wire/convert.hpp"
 #include "eval/experiments/existence/census/census_drive.hpp"
 #include "eval/experiments/existence/census/landmark_stems.hpp"
 #include "eval/harness/drive_map.hpp"
+#include "eval/harness/input_log.hpp"
 #include "sim/hash_random.hpp"
-#include "understory/ground_truth_t.hpp"
 
 namespace understory::eval::experiments::existence::census {
 namespace {
@@ -53,39 +51,13 @@ std::map<std::string, std::string> census_parameters(const CensusOptions& option
           {kTracker, bus::layer_over(bus::config_file_in(options.config_dir, kTracker), tracker)}};
 }
 
-/// Keeps what goes into the processes, and the truth.
-class Recorder {
- public:
-  /// An empty path: keeps nothing.
-  explicit Recorder(const std::filesystem::path& file) {
-    if (!file.empty()) writer_.emplace(file);
-  }
-  void add(model::Utime utime, const char* channel, const wire::Bytes& bytes) {
-    if (writer_) writer_->write(utime, channel, bytes);
-  }
-  void add_truth(model::Utime utime, const geometry::SE2& world_T_vehicle) {
-    ground_truth_t truth{};
-    truth.seq = truths_++;
-    truth.utime = utime;
-    truth.world_T_vehicle = wire::to_wire(world_T_vehicle);
-    add(utime, "GROUND_TRUTH", wire::encode_message(truth));
-  }
-  void finish() {
-    if (writer_) writer_->commit();
-  }
-
- private:
-  std::optional<io::LcmLogWriter> writer_;
-  std::int64_t truths_ = 0;
-};
-
 /// One drive through the processes.
 harness::ChainRun drive_processes(CensusDrive& drive, const CensusOptions& options,
                                   const std::filesystem::path& map,
                                   const std::filesystem::path& log,
                                   const std::vector<geometry::SE2>& path, LandmarkStems& names,
                                   const std::function<void(double)>& progress) {
-  Recorder recorder(log);
+  harness::InputLog recorder(log);
   harness::ChainRun run;
   harness::SensorChain chain(services_from_landmarks(options.config_dir), options.config_dir,
                              census_parameters(options, map));
@@ -192,7 +164,6 @@ CensusRun run_census(const std::vector<CensusStem>& stems, const CensusOptions& 
   LandmarkStems names;
   std::vector<std::uint32_t> mapped;
   std::filesystem::path map;
-  if (!options.logs.empty()) std::filesystem::create_directories(options.logs);
   for (int k = 0; k <= setting.drives; ++k) {
     const bool is_later = k > 0 && setting.is_changed;
     const double time_s =

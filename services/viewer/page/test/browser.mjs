@@ -37,39 +37,39 @@ export async function until(what, condition, limitMs = 20_000, pauseMs = 50) {
 
 export const pictures = (page, n) => until(`${n} pictures`, async () => (await stats(page)).pictures >= n, 120_000, 100);
 
-/** Number of colours, and the share of pixels that differ from the most frequent one, in a screenshot of the map. */
-export async function colours(page) {
+/** What `look(pixels)` gives in the page of a screenshot of the map, RGBA bytes. */
+async function ofMap(page, look) {
   const png = await page.locator('[data-test="map"]').screenshot();
-  return page.evaluate(async (data) => {
+  const decode = async (data) => {
     const image = new Image();
     image.src = `data:image/png;base64,${data}`;
     await image.decode();
     const g = new OffscreenCanvas(image.width, image.height).getContext("2d");
     g.drawImage(image, 0, 0);
-    const pixels = new Uint32Array(g.getImageData(0, 0, image.width, image.height).data.buffer), counts = new Map();
-    for (const p of pixels) counts.set(p, (counts.get(p) ?? 0) + 1);
-    return { colours: counts.size, share: 1 - Math.max(...counts.values()) / pixels.length };
-  }, png.toString("base64"));
+    return g.getImageData(0, 0, image.width, image.height).data;
+  };
+  return page.evaluate(`(${decode})("${png.toString("base64")}").then(${look})`);
 }
 
+/** Number of colours, and the share of pixels that differ from the most frequent one, in a screenshot of the map. */
+export const colours = (page) =>
+  ofMap(page, (data) => {
+    const pixels = new Uint32Array(data.buffer), counts = new Map();
+    for (const p of pixels) counts.set(p, (counts.get(p) ?? 0) + 1);
+    return { colours: counts.size, share: 1 - Math.max(...counts.values()) / pixels.length };
+  });
+
 /** Of the pixels of the map, the share in a colour of landmarks, by its name in the palette; a pixel at an edge is none. */
-export async function paints(page) {
-  const png = await page.locator('[data-test="map"]').screenshot();
-  return page.evaluate(async (data) => {
-    const image = new Image();
-    image.src = `data:image/png;base64,${data}`;
-    await image.decode();
-    const g = new OffscreenCanvas(image.width, image.height).getContext("2d");
-    g.drawImage(image, 0, 0);
-    const pixels = g.getImageData(0, 0, image.width, image.height).data, palette = window.understory.palette(), shares = {};
+export const paints = (page) =>
+  ofMap(page, (pixels) => {
+    const palette = window.understory.palette(), shares = {};
     for (const [name, colour] of Object.entries(palette)) {
       let n = 0;
       for (let i = 0; i < pixels.length; i += 4) if (colour.every((c, k) => Math.abs(pixels[i + k] - 255 * c) < 14)) n++;
       shares[name] = n / (pixels.length / 4);
     }
     return { shares, palette: JSON.stringify(palette) };
-  }, png.toString("base64"));
-}
+  });
 
 export function must(condition, text) {
   if (!condition) throw new Error(text);
