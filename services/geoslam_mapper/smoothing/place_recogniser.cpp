@@ -8,9 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "common/factor_graph/plane/graph.hpp"
 #include "common/geometry/registration.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
+
+namespace plane = factor_graph::plane;
+
 namespace {
 
 /// Beyond the field of view, so that a landmark at its edge is found whatever the pose's error.
