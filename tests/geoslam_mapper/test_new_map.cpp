@@ -35,6 +35,21 @@ std::vector<model::Keyframe> keyframes_of(const sim::Drive& drive, model::Utime 
   return result;
 }
 
+/// Keyframes of one scan, metres apart: every eighth scan of a drive.
+std::vector<model::Keyframe> keyframes_of_one_scan(const sim::Drive& drive, model::Utime late_us) {
+  keyframer::JointKeyframerParameters parameters;
+  parameters.observations_per_keyframe = 1;
+  parameters.min_observations = 1;
+  keyframer::joint::JointKeyframer keyframer(parameters);
+  std::vector<model::Keyframe> result;
+  for (std::size_t k = 0; k < drive.size(); k += kScansPerKeyframe) {
+    model::LandmarkScan scan = drive.scan(k).scan;
+    scan.utime += late_us;
+    if (auto keyframe = keyframer.add(scan)) result.push_back(std::move(*keyframe));
+  }
+  return result;
+}
+
 const geometry::SE2& truth_of(const model::Keyframe& keyframe, const sim::Drive& drive) {
   return drive.world_T_vehicle()[kScansPerKeyframe * keyframe.sequence];
 }
@@ -227,6 +242,33 @@ TEST_CASE("Odometry with a gap, or too uncertain, does not keep anyone in a map"
     CHECK(updates[2].status == model::MapUpdateStatus::kFirstMap);
     CHECK(updates.back().map_id == 2);
     CHECK(is_placed(updates.back()));
+  }
+}
+
+TEST_CASE("A new map begins as well where a landmark needs two keyframes", "[new_map]") {
+  SmoothingMapperParameters parameters = with_odometry();
+  parameters.min_observations = 2;
+  parameters.min_matched = 3;
+  for (std::uint64_t seed = 370; seed < 376; ++seed) {
+    SmoothingMapper mapper(parameters);
+    std::vector<model::MapUpdate> updates;
+    model::Utime late_us = 0;
+    for (const sim::Drive& drive : {walk(seed, 60.0), walk(seed + 1000, 60.0)}) {
+      // No odometry leads from the one to the other.
+      std::optional<model::Keyframe> last;
+      for (const model::Keyframe& keyframe : keyframes_of_one_scan(drive, late_us)) {
+        if (last) {
+          const geometry::SE2 motion = truth_of(*last, drive).inverse() * truth_of(keyframe, drive);
+          mapper.add(odometry_to(keyframe, last->utime, motion, 0.02, 0.002).front());
+        }
+        updates.push_back(mapper.add(keyframe));
+        last = keyframe;
+      }
+      CHECK(is_placed(updates.back()));
+      late_us = last->utime + 60'000'000;
+    }
+    CHECK(updates.back().map_id == 2);
+    CHECK(mapper.kept_maps().maps().size() == 1);
   }
 }
 

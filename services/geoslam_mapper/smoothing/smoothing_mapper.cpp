@@ -127,8 +127,9 @@ void SmoothingMapper::try_another(const model::Keyframe& keyframe, model::MapUpd
   bool agree = false;
   if (trial_) {
     const auto map_T_previous_base = trial_->map_T_last_base();
+    const bool had_landmarks = !trial_->map().landmarks.empty();
     tried = trial_->add(keyframe);
-    agree = trial_->map().empty() || agrees(keyframe, tried, map_T_previous_base);
+    agree = trial_->map().empty() || agrees(keyframe, tried, had_landmarks, map_T_previous_base);
   }
   if (!agree) {
     trial_ = std::make_unique<OneMap>(current_.beside(id));
@@ -140,15 +141,16 @@ void SmoothingMapper::try_another(const model::Keyframe& keyframe, model::MapUpd
   adopt_trial(update);
 }
 
-/// It was localised by landmarks, where the keyframer tracked it.
+/// It was localised by landmarks, where the keyframer tracked it. Where a landmark needs two
+/// keyframes, the first one leaves none, and odometry alone places the second.
 bool SmoothingMapper::agrees(
-    const model::Keyframe& keyframe, const model::MapUpdate& update,
+    const model::Keyframe& keyframe, const model::MapUpdate& update, bool had_landmarks,
     const std::optional<geometry::SE2WithCovariance>& map_T_previous_base) const {
   using enum model::MapUpdateStatus;
   if (update.status == kFirstMap) return true;
-  if (update.status != kUpdated ||
-      update.inliers < static_cast<std::uint32_t>(parameters_.min_matched))
-    return false;
+  if (update.status != kUpdated) return false;
+  if (!had_landmarks) return true;
+  if (update.inliers < static_cast<std::uint32_t>(parameters_.min_matched)) return false;
   if (!map_T_previous_base || !keyframe.previous_T_base) return true;
 
   const geometry::SE2 difference =

@@ -93,7 +93,7 @@ class SmoothingMapper final : public MapperMethod {
   void count_contradictions(const model::MapUpdate& update);
   bool may_try_another(const model::MapUpdate& update) const;
   void try_another(const model::Keyframe& keyframe, model::MapUpdate& update);
-  bool agrees(const model::Keyframe& keyframe, const model::MapUpdate& update,
+  bool agrees(const model::Keyframe& keyframe, const model::MapUpdate& update, bool had_landmarks,
               const std::optional<geometry::SE2WithCovariance>& map_T_previous_base) const;
   void adopt_trial(model::MapUpdate& update);
   void rejoin_left_maps(const model::Keyframe& keyframe, model::MapUpdate& update);
