@@ -1,10 +1,15 @@
 // The judge of drives with faults: against drives whose errors are known.
+#include <signal.h>
+
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <random>
 
 #include "eval/experiments/reliability/pose_judge.hpp"
+#include "eval/experiments/reliability/processes.hpp"
 #include "tests/catch.hpp"
+#include "tests/scratch.hpp"
 
 using namespace understory;
 using namespace understory::eval;
@@ -53,6 +58,15 @@ struct Drive {
   std::vector<SaidPose> said;
   std::vector<metrics::StampedPose> truth;
 };
+
+/// Whether a process has ended that nobody has waited for yet.
+bool is_ended(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  std::string line;
+  std::getline(file, line);
+  const auto behind_name = line.rfind(") ");
+  return behind_name == std::string::npos || line[behind_name + 2] == 'Z';
+}
 
 const std::vector<Fault> kFaults = {{.what = "a", .from_s = 30.0, .to_s = 35.0},
                                     {.what = "b", .from_s = 60.0, .to_s = 61.0}};
@@ -141,4 +155,37 @@ TEST_CASE("delays are apart, and of every kind", "[reliability]") {
   for (const Fault& fault : draw_delays(plan, 20, random)) CHECK(fault.what == "ekf stopped");
   plan.only = "nothing";
   CHECK_THROWS_AS(draw_delays(plan, 1, random), std::invalid_argument);
+}
+
+TEST_CASE("a launch that takes a while ends what it started, one that hangs is killed",
+          "[reliability]") {
+  const test::Scratch directory("reliability");
+  const std::filesystem::path note = directory.path() / "pid";
+  // As `launch` does: another group, which it ends some time after it is asked to.
+  const std::string script = "setsid sleep 600 & c=$!; echo $c > " + note.string() + ".new; mv " +
+                             note.string() + ".new " + note.string() +
+                             "; trap 'sleep 0.3; kill $c; exit' TERM; wait";
+  {
+    Processes processes;
+    processes.start({"sh", {"-c", script}, {}});
+    while (!std::filesystem::exists(note))
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  pid_t pid = 0;
+  std::ifstream(note) >> pid;
+  REQUIRE(pid > 0);
+  const auto last = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  const auto runs = [&] { return ::kill(pid, 0) == 0 && !is_ended(pid); };
+  while (runs() && std::chrono::steady_clock::now() < last)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  CHECK_FALSE(runs());
+  if (runs()) ::kill(pid, SIGKILL);
+
+  const auto begin = std::chrono::steady_clock::now();
+  {
+    Processes processes(std::chrono::milliseconds(200));
+    processes.start({"sh", {"-c", "trap '' TERM; while :; do sleep 0.01; done"}, {}});
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
 }

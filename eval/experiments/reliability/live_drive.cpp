@@ -232,6 +232,8 @@ std::vector<std::string> processes_of(const std::filesystem::path& config_dir) {
 }
 
 LiveDrive play(const SensorTape& tape, std::span<const Fault> faults, const LiveOptions& options) {
+  // Before the first process starts: an interrupt must leave none.
+  const std::atomic<bool>& is_interrupted = terminal::catch_interrupts();
   const std::string url = own_url();
   const ScratchFolder folder;
   Listener listener(url, faults);
@@ -260,7 +262,6 @@ LiveDrive play(const SensorTape& tape, std::span<const Fault> faults, const Live
     is_over = true;
   });
 
-  const std::atomic<bool>& is_interrupted = terminal::catch_interrupts();
   while (!is_over && !is_interrupted) listener.handle(10);
   stops = true;
   thread.join();

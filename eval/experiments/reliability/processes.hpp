@@ -10,15 +10,29 @@
 
 namespace understory::eval::experiments::reliability {
 
-/// Processes that are killed when this goes.
+/// Processes that end when this goes. They are asked to: `understory launch` that is killed leaves
+/// the processes that it started, for the next launch to adopt. Only what does not end is killed.
 class Processes {
  public:
-  Processes() = default;
+  using Clock = std::chrono::steady_clock;
+
+  /// Longer than a launch takes at most: it ends its processes in two groups.
+  explicit Processes(std::chrono::milliseconds patience = std::chrono::seconds(20))
+      : patience_(patience) {}
   ~Processes() {
+    ask_to_end();
+    // A process that a fault has stopped takes no SIGTERM before it goes on.
     for (const auto& child : children_) child.signal(SIGCONT);
-    for (const auto& child : children_) child.signal(SIGKILL);
+    const auto last = Clock::now() + patience_;
+    bool is_killed = false;
     for (const auto& child : children_) {
-      while (!child.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      while (!child.ended()) {
+        if (!is_killed && Clock::now() > last) {
+          for (const auto& late : children_) late.signal(SIGKILL);
+          is_killed = true;
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
     }
   }
   Processes(const Processes&) = delete;
@@ -33,6 +47,7 @@ class Processes {
   }
 
  private:
+  std::chrono::milliseconds patience_;
   std::vector<launch::ChildProcess> children_;
 };
 
