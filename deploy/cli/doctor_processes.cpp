@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "common/model/sensor_channel.hpp"
 #include "common/terminal/printable.hpp"
 #include "deploy/cli/doctor_findings.hpp"
 
@@ -88,31 +89,44 @@ void buffer_findings(const Latest& latest, std::vector<Finding>& findings) {
                       "deploy/setup --tune, then start them again"});
 }
 
-/// Raw channels on which the first process of the chain hears nothing.
+/// Channels of sensors of one kind that a process listens to.
+struct SensorInputs {
+  bool is_taken = false;  ///< It listens to one of this kind.
+  bool is_heard = false;
+
+  void note(const channel_health_t& channel) {
+    is_taken = true;
+    is_heard = is_heard || channel.rate_hz > 0.0;
+  }
+  bool is_missing() const { return is_taken && !is_heard; }
+};
+
+/// Sensors' channels on which the first process of the chain hears nothing. Others have inputs of
+/// sensors, too (the viewer, a recorder), and RAW_POSE, which is none.
 void sensor_findings(const Latest& latest, std::vector<Finding>& findings) {
   for (const auto& [key, health] : latest) {
-    std::set<std::string> silent;
-    std::set<std::string> heard;
+    SensorInputs laser;
+    SensorInputs motion;
+    std::string silent;
     for (const channel_health_t& channel : health.channels) {
-      if (channel.output != 0 || !channel.channel.starts_with("RAW_")) continue;
-      (channel.rate_hz > 0.0 ? heard : silent).insert(channel.channel);
+      if (channel.output != 0 || !model::is_sensor_channel(channel.channel)) continue;
+      const std::string& name = channel.channel;
+      if (name == "RAW_SWEEP" || name == "RAW_SCAN") laser.note(channel);
+      if (name == "RAW_IMU" || name == "RAW_WHEELS") motion.note(channel);
+      if (channel.rate_hz <= 0.0) silent += fmt::format(" {}", printable(name));
     }
-    if (heard.empty() && silent.empty()) continue;
-    const bool has_laser = heard.contains("RAW_SWEEP") || heard.contains("RAW_SCAN");
-    const bool has_motion = heard.contains("RAW_IMU") || heard.contains("RAW_WHEELS");
 
-    std::string list;
-    for (const std::string& one : silent) list += fmt::format(" {}", printable(one));
     const char* const advice =
         "is the sensor's driver running, on this bus (lcm-spy: deploy/spy)? RAW_SWEEP comes in the "
         "second group, one port higher";
-    if (!has_laser || !has_motion) {
-      findings.push_back({has_laser ? Verdict::kAdvice : Verdict::kBad, "sensors",
+    if (laser.is_missing() || motion.is_missing()) {
+      findings.push_back({laser.is_missing() ? Verdict::kBad : Verdict::kAdvice, "sensors",
                           fmt::format("{} hears no {}: nothing on{}", printable(key.first),
-                                      has_laser ? "motion" : "laser", list),
+                                      laser.is_missing() ? "laser" : "motion", silent),
                           advice});
-    } else if (!list.empty()) {
-      findings.push_back({Verdict::kGood, "sensors", "laser and motion; nothing on" + list, ""});
+    } else if (!silent.empty()) {
+      findings.push_back({Verdict::kGood, "sensors",
+                          fmt::format("{}: nothing on{}", printable(key.first), silent), ""});
     }
   }
 }

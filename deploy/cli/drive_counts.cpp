@@ -1,12 +1,14 @@
 #include "deploy/cli/drive_counts.hpp"
 
+#include "common/model/sensor_channel.hpp"
+
 namespace understory::cli {
 namespace {
 
-/// Recorded by a sensor or known from outside the run. RAW_POSE is dead reckoning, an output.
+/// Recorded by a sensor or known from outside the run.
 bool is_outside(const std::string& channel) {
-  if (channel == "GROUND_TRUTH" || channel == "TRUTH_LANDMARKS") return true;
-  return channel.starts_with("RAW_") && channel != "RAW_POSE";
+  return channel == "GROUND_TRUTH" || channel == "TRUTH_LANDMARKS" ||
+         model::is_sensor_channel(channel);
 }
 
 std::string status_of(const model::SlamPose& pose) {

@@ -146,6 +146,21 @@ TEST_CASE("doctor finds losses by their share, and sensors from which nothing co
   CHECK(verdict_on(on_processes({input}), "sensors", "nothing on RAW_IMU") == Verdict::kGood);
 }
 
+TEST_CASE("doctor asks for sensors only the process that has them as inputs", "[cli]") {
+  const auto bad = [](const std::vector<Finding>& findings) {
+    return std::ranges::count(findings, "sensors", &Finding::subject);
+  };
+  // Dead reckoning is no sensor, whether it comes or not.
+  for (const double rate_hz : {0.0, 50.0}) {
+    auto filter = healthy("ekf", 1);
+    add_channel(filter, "RAW_POSE", rate_hz, 100);
+    CHECK(bad(on_processes({filter})) == 0);
+  }
+  auto recorder = healthy("gnss_recorder", 1);
+  add_channel(recorder, "RAW_GNSS", 10.0, 100);
+  CHECK(bad(on_processes({recorder})) == 0);
+}
+
 TEST_CASE("doctor looks at clock, governor and the place of the state", "[cli]") {
   CHECK(cli::clock_jump_finding(2'500'000, 2'500'900).verdict == Verdict::kGood);
   CHECK(cli::clock_jump_finding(2'500'000, 1'000'000).verdict == Verdict::kBad);
