@@ -38,7 +38,7 @@ void listen_until(HealthListener& listener, Clock::time_point end) {
 /// What a driver must know comes first, in the words of the viewer's page.
 void print(const StatusTable& table, const viewer::Scene& scene, bool json) {
   const auto now = Clock::now();
-  const viewer::Verdict& verdict = scene.verdict().value;
+  const viewer::Verdict verdict = pose_verdict(scene.verdict().value, table);
   if (json) {
     nlohmann::ordered_json document = table.json(now);
     document["pose"] = {{"state", viewer::state_name(verdict.state)}, {"text", verdict.text}};

@@ -68,6 +68,16 @@ std::string StatusTable::reason_counts(const health_t& health) {
   return result;
 }
 
+std::int64_t StatusTable::poses_sent() const {
+  std::int64_t sent = 0;
+  for (const auto& [name, entry] : latest_) {
+    for (const channel_health_t& channel : entry.health.channels) {
+      if (channel.output != 0 && channel.channel == "SLAM_POSE") sent += channel.messages;
+    }
+  }
+  return sent;
+}
+
 std::string StatusTable::text(Clock::time_point now) const {
   std::string result;
   for (const auto& [name, entry] : latest_) {
@@ -127,6 +137,15 @@ nlohmann::ordered_json StatusTable::json(Clock::time_point now) const {
   }
 
   return {{"processes", std::move(processes)}};
+}
+
+viewer::Verdict pose_verdict(const viewer::Verdict& heard, const StatusTable& table) {
+  const std::int64_t sent = table.poses_sent();
+  if (heard.state != viewer::Verdict::State::kWaiting || sent == 0) return heard;
+  viewer::Verdict verdict = heard;
+  verdict.state = viewer::Verdict::State::kSilent;
+  verdict.text = fmt::format("no pose comes any more, {} came before", sent);
+  return verdict;
 }
 
 }  // namespace understory::cli

@@ -6,6 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "services/viewer/shown_pose.hpp"
 #include "understory/health_t.hpp"
 
 namespace understory::cli {
@@ -22,6 +23,8 @@ class StatusTable {
   void add(const health_t& health, Clock::time_point now);
   /// True before the first message.
   bool empty() const { return latest_.empty(); }
+  /// How many SLAM_POSE the processes have sent since they started, as they say.
+  std::int64_t poses_sent() const;
   /// The table for a terminal, one process a line; texts of the processes are escaped.
   std::string text(Clock::time_point now) const;
   /// The same for scripts.
@@ -37,5 +40,9 @@ class StatusTable {
   };
   std::map<std::string, Entry> latest_;  ///< By name of the process.
 };
+
+/// What is told of the pose: by the poses that were heard, and where none was by what the processes
+/// say in HEALTH. No pose now and some before is silence; waiting is before the first one.
+viewer::Verdict pose_verdict(const viewer::Verdict& heard, const StatusTable& table);
 
 }  // namespace understory::cli

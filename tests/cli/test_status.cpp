@@ -70,3 +70,34 @@ TEST_CASE("hostile HEALTH reaches the terminal escaped, and JSON whole", "[cli]"
   CHECK(parsed["processes"][0]["last_error"].get<std::string>().starts_with("\x1B[2J"));
   CHECK(parsed["processes"][0]["channels"].size() == 1);
 }
+
+TEST_CASE("status after a drive has ended: silent, not waiting", "[cli]") {
+  StatusTable table;
+  const auto now = StatusTable::Clock::now();
+  const viewer::Verdict none_heard;
+  health_t mapper{};
+  mapper.process = "geoslam_mapper";
+  mapper.channels.resize(2);
+  mapper.channels[0].channel = "SLAM_POSE";
+  mapper.channels[0].output = 1;
+  mapper.channels[1].channel = "KEYFRAME";
+  mapper.channels[1].messages = 7;
+  table.add(mapper, now);
+  health_t page{};
+  page.process = "viewer";
+  page.channels.resize(1);
+  page.channels[0].channel = "SLAM_POSE";
+  page.channels[0].messages = 5;
+  table.add(page, now);
+  CHECK(pose_verdict(none_heard, table).state == viewer::Verdict::State::kWaiting);
+
+  mapper.channels[0].messages = 1234;
+  table.add(mapper, now);
+  const viewer::Verdict ended = pose_verdict(none_heard, table);
+  CHECK(ended.state == viewer::Verdict::State::kSilent);
+  CHECK(ended.text.find("1234") != std::string::npos);
+
+  // What is heard says more.
+  const viewer::Verdict heard{viewer::Verdict::State::kOk, "localised", 1};
+  CHECK(pose_verdict(heard, table).text == "localised");
+}
