@@ -113,6 +113,18 @@ void select_loops(const Connection& connection, StoredMap& map) {
   }
 }
 
+/// A landmark is in one map of a file.
+void refuse_landmarks_of_others(const Connection& connection, const StoredMap& map) {
+  Statement row = connection.prepare("SELECT map_id FROM landmarks WHERE landmark_id = ?1");
+  for (const StoredLandmark& one : map.landmarks) {
+    if (row.bind(signed_of(one.landmark.id)).step())
+      throw MapFileError(
+          Fault::kRefused,
+          fmt::format("{}: map {} is not stored: its landmark {} is in map {} already",
+                      connection.file().string(), map.map_id, one.landmark.id, row.integer(0)));
+  }
+}
+
 }  // namespace
 
 void delete_map(const Connection& connection, std::uint32_t map_id) {
@@ -140,6 +152,7 @@ void insert_map(const Connection& connection, const StoredMap& map) {
       .bind(std::int64_t{map.map_id}, std::string_view(map.name), std::int64_t{map.created_utime},
             std::string_view(map.origin))
       .run();
+  refuse_landmarks_of_others(connection, map);
   LandmarkRows landmarks(connection, SameLandmark::kRefused);
   for (const StoredLandmark& one : map.landmarks) landmarks.put(map.map_id, one);
   insert_all(KeyframeRows(connection), map.map_id, map.keyframes);

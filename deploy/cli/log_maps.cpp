@@ -1,6 +1,7 @@
 #include "deploy/cli/log_maps.hpp"
 
 #include <algorithm>
+#include <set>
 
 #include "common/wire/convert.hpp"
 
@@ -23,6 +24,17 @@ std::optional<map_file::StoredExistence> states_of(const std::vector<model::MapL
   }
   if (result.landmarks.empty()) return std::nullopt;
   return result;
+}
+
+/// Takes out the maps whose landmarks are in a later one.
+void drop_joined(std::map<std::uint32_t, LogMaps::Found>& maps) {
+  std::set<std::uint32_t> joined;
+  for (const auto& [map_id, found] : maps) {
+    for (const model::MapLandmark& landmark : found.map.landmarks) {
+      if (model::map_of(landmark.id) < map_id) joined.insert(model::map_of(landmark.id));
+    }
+  }
+  for (const std::uint32_t map_id : joined) maps.erase(map_id);
 }
 
 }  // namespace
@@ -67,6 +79,7 @@ std::map<std::uint32_t, LogMaps::Found> LogMaps::take() {
   // The map in use at the end is one, however young it is.
   is_provisional_ = false;
   keep();
+  drop_joined(left_);
   const map_file::StoredExistence all = existence_.stored();
   for (auto& [map_id, found] : left_) found.existence = states_of(found.map.landmarks, all);
   return std::move(left_);

@@ -27,7 +27,8 @@ class LogMaps {
 
   /// Takes one event; channels that do not matter are passed over.
   void add(const io::LogEvent& event);
-  /// All maps by their number, once the log is read.
+  /// All maps by their number, once the log is read. A map that became part of a later one is not
+  /// among them: its landmarks are in the later one, with their ids.
   std::map<std::uint32_t, Found> take();
 
  private:

@@ -109,6 +109,50 @@ void refuse_known(const MapImportOptions& options, const std::vector<StoredMap>&
   }
 }
 
+/// The map of these landmarks that the file has and that stays there; 0 for none.
+std::uint32_t joined_map(const StoredMap& map, const std::vector<map_file::MapSummary>& known) {
+  for (const map_file::StoredLandmark& one : map.landmarks) {
+    const std::uint32_t from = model::map_of(one.landmark.id);
+    const bool is_other = from != map.map_id;
+    if (is_other && std::ranges::find(known, from, &map_file::MapSummary::map_id) != known.end())
+      return from;
+  }
+  return 0;
+}
+
+/// A landmark is in one map of a file: a map that took another one in cannot be beside it.
+void refuse_joined(const MapImportOptions& options, const std::vector<StoredMap>& maps,
+                   const std::vector<map_file::MapSummary>& known) {
+  for (const StoredMap& map : maps) {
+    if (const std::uint32_t from = joined_map(map, known); from != 0)
+      fail(
+          fmt::format("{}: map {} became part of map {} in {}, in the frame of map {}: import it "
+                      "into another file (`understory map merge` joins the two)",
+                      options.out, from, map.map_id, options.source(), map.map_id));
+  }
+}
+
+/// Of the maps of a drive that began in a map of the file those in its frame. A map that the mapper
+/// began later (the vehicle was lost) has a frame of its own.
+void keep_same_frame(const MapImportOptions& options,
+                     const std::vector<map_file::MapSummary>& known, std::vector<StoredMap>& maps) {
+  const auto is_known = [&](const StoredMap& map) {
+    return std::ranges::find(known, map.map_id, &map_file::MapSummary::map_id) != known.end();
+  };
+  const auto first_other = std::ranges::stable_partition(maps, is_known).begin();
+  std::string others;
+  for (auto one = first_other; one != maps.end(); ++one)
+    others += fmt::format("{}{}", others.empty() ? "" : ", ", one->map_id);
+  if (others.empty()) return;
+  const std::string text = fmt::format(
+      "{}: map {} is not imported: the drive began it where it was lost, in another frame than the "
+      "maps of {} (without --same-frame into another file; `understory map merge` joins the two)",
+      options.source(), others, options.out);
+  maps.erase(first_other, maps.end());
+  if (maps.empty()) fail(text);
+  fmt::print(stderr, "{}\n", text);
+}
+
 /// All maps of a file share one frame: what is added must be in it.
 void require_same_frame(const MapImportOptions& options, const KnownFile& known, bool is_log) {
   const bool states_system = !options.table.crs.empty();
@@ -138,6 +182,8 @@ MapsToStore read_maps(MapImportOptions options, const map_file::ChangeNote& note
   MapsToStore read;
   if (is_log) {
     read.maps = maps_of_log(options);
+    if (options.same_frame && !known.maps.empty()) keep_same_frame(options, known.maps, read.maps);
+    refuse_joined(options, read.maps, known.maps);
   } else {
     MapOfTable table = map_of_table(options.table, known.reference);
     read.reference = std::move(table.reference);

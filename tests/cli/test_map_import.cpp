@@ -64,6 +64,11 @@ struct MapperLog {
     }
     add("EXISTENCE_STATE", message);
   }
+  void write(const std::filesystem::path& file) const {
+    io::LcmLogWriter writer(file);
+    for (const io::LogEvent& event : events) writer.write(event);
+    writer.commit();
+  }
   std::map<std::uint32_t, cli::LogMaps::Found> maps() const {
     cli::LogMaps maps;
     for (const io::LogEvent& event : events) maps.add(event);
@@ -102,6 +107,19 @@ TEST_CASE("a provisional map that gave way is none, one at the end is", "[cli]")
   CHECK(maps.contains(2));
 }
 
+TEST_CASE("a map that became part of a later one is in the later one only", "[cli]") {
+  MapperLog log;
+  log.update(1, true, false);
+  log.delta(true, {landmark(1, 1, 0.0)});
+  log.update(2, true, false);
+  log.delta(true, {landmark(2, 1, 1.0)});
+  log.update(2, false, false);
+  log.delta(false, {landmark(1, 1, 7.0)});
+  const auto maps = log.maps();
+  REQUIRE(maps.size() == 1);
+  CHECK(maps.at(2).map.landmarks.size() == 2);
+}
+
 TEST_CASE("a log that begins in the middle of a map gives it from its first MAP on", "[cli]") {
   MapperLog log;
   log.version = 7;
@@ -128,13 +146,15 @@ TEST_CASE("states of existence are those of a map's landmarks; empty ones are pa
   log.existence(1, {1}, "first");
   log.update(2, true, false);
   log.existence(1, {2}, "late");
+  // A map that was left has its own, also those that came later.
+  REQUIRE(log.maps().at(1).existence);
+  CHECK(log.maps().at(1).existence->landmarks.size() == 2);
   // The map that was left becomes part of the next one, as far as the log tells.
   log.delta(true, {landmark(1, 2, 3.0), landmark(2, 1, 1.0), landmark(2, 2, 1.0)});
   log.existence(2, {1}, "second");
   log.existence(2, {2}, "");
   const auto maps = log.maps();
-  REQUIRE(maps.at(1).existence);
-  CHECK(maps.at(1).existence->landmarks.size() == 2);
+  CHECK_FALSE(maps.contains(1));
   REQUIRE(maps.at(2).existence);
   REQUIRE(maps.at(2).existence->landmarks.size() == 2);
   CHECK(maps.at(2).existence->landmarks[0].state == "late");
@@ -188,11 +208,7 @@ TEST_CASE("what is imported has the states of its landmarks, and says so", "[cli
   log.update(1, true, false);
   log.delta(true, {landmark(1, 1, 0.0), landmark(1, 2, 5.0)});
   log.existence(1, {2, 9}, "state");
-  {
-    io::LcmLogWriter writer(directory / "drive.lcm");
-    for (const io::LogEvent& event : log.events) writer.write(event);
-    writer.commit();
-  }
+  log.write(directory / "drive.lcm");
   const auto run = [&](const std::string& arguments) {
     const Outcome outcome = understory_command(directory, arguments);
     CAPTURE(arguments, outcome.error);
@@ -226,6 +242,49 @@ TEST_CASE("what is imported has the states of its landmarks, and says so", "[cli
   const auto messages = map_file::existence_of(map_file::MapFile(file, map_file::Access::kRead), 1);
   REQUIRE(messages.size() == 1);
   CHECK(messages[0].states == "state");
+}
+
+TEST_CASE("of a drive in a given map that began another map, that other one is told", "[cli]") {
+  const TemporaryDirectory directory;
+  const auto run = [&](const std::string& arguments) {
+    return understory_command(directory, arguments);
+  };
+  const auto path = [&](const char* name) { return (directory / name).string(); };
+  MapperLog before;
+  before.update(1, true, false);
+  before.delta(true, {landmark(1, 1, 0.0)});
+  before.write(path("before.lcm"));
+  const std::string file = path("given.gpkg");
+  REQUIRE(run("map import " + path("before.lcm") + " --out " + file).status == 0);
+
+  MapperLog lost;
+  lost.update(1, true, false);
+  lost.delta(true, {landmark(1, 1, 0.0), landmark(1, 2, 5.0)});
+  lost.update(2, true, false);
+  lost.delta(true, {landmark(2, 1, 1.0)});
+  lost.write(path("lost.lcm"));
+  const Outcome kept =
+      run("map import " + path("lost.lcm") + " --same-frame --replace --out " + file);
+  CAPTURE(kept.error);
+  REQUIRE(kept.status == 0);
+  CHECK_THAT(kept.error, Contains("map 2 is not imported") && Contains("in another frame"));
+  CHECK_THAT(kept.out, Contains("map 1 of 2 landmarks") && !Contains("map 2"));
+
+  // The old map became part of the new one, in the new one's frame.
+  MapperLog& joined = lost;
+  joined.update(2, false, false);
+  joined.delta(false, {landmark(1, 1, 7.0), landmark(1, 2, 12.0)});
+  joined.write(path("joined.lcm"));
+  for (const std::string options : {" --same-frame --replace", " --same-frame"}) {
+    const Outcome none = run("map import " + path("joined.lcm") + options + " --out " + file);
+    CHECK(none.status == 1);
+    CHECK_THAT(none.error, Contains("map 2 is not imported") && !Contains("UNIQUE"));
+  }
+  const Outcome beside = run("map import " + path("joined.lcm") + " --out " + file);
+  CHECK(beside.status == 1);
+  CHECK_THAT(beside.error, Contains("map 1 became part of map 2") && !Contains("UNIQUE"));
+  CHECK(run("map import " + path("joined.lcm") + " --out " + path("own.gpkg")).status == 0);
+  CHECK(run("map check " + file).status == 0);
 }
 
 TEST_CASE("a drive becomes a map file", "[cli]") {

@@ -148,6 +148,37 @@ TEST_CASE("what a map cannot have is refused, and nothing is changed", "[map_fil
   CHECK(fault_of_work(file, [&] { MapFile(file, Access::kRead).read(9); }) == Fault::kRefused);
 }
 
+TEST_CASE("a map with a landmark of another map is refused with both numbers", "[map_file]") {
+  const TemporaryDirectory directory;
+  const auto file = directory / "maps.gpkg";
+  std::mt19937_64 random(5);
+  StoredMap first = random_map(1, random);
+  first.existence.reset();
+  first.landmarks = {random_landmark(map_file::landmark_id(1, 1), random)};
+  map_file::create_map_file(file, {&first, 1}, note("first"));
+  const std::string before = dump(file);
+
+  StoredMap second = random_map(2, random);
+  second.existence.reset();
+  second.landmarks = {random_landmark(map_file::landmark_id(1, 1), random),
+                      random_landmark(map_file::landmark_id(2, 1), random)};
+  try {
+    MapFile(file, Access::kWrite).put({&second, 1}, note("second"));
+    FAIL("stored");
+  } catch (const map_file::MapFileError& error) {
+    CHECK(error.fault() == Fault::kRefused);
+    const std::string text = error.what();
+    CHECK_THAT(text, Catch::Matchers::Contains("map 2 is not stored"));
+    CHECK_THAT(text, Catch::Matchers::Contains("is in map 1 already"));
+  }
+  CHECK(dump(file) == before);
+  // Where map 1 has it no longer, map 2 may.
+  first.landmarks.clear();
+  const std::vector<StoredMap> both{first, second};
+  MapFile(file, Access::kWrite).put(both, note("both"));
+  CHECK(MapFile(file, Access::kRead).read(2).landmarks.size() == 2);
+}
+
 TEST_CASE("a new file takes no name that is taken, follows links and leaves nothing",
           "[map_file]") {
   const TemporaryDirectory directory;
