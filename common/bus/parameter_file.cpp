@@ -80,8 +80,8 @@ struct Setting {
 class Loader {
  public:
   Loader(const std::vector<ParameterTable::Entry>& entries,
-         const std::vector<ParameterTable::Renamed>& renamed)
-      : entries_(entries), renamed_(renamed) {}
+         const std::vector<ParameterTable::OldKey>& old_keys)
+      : entries_(entries), old_keys_(old_keys) {}
 
   /// Takes a file; what an earlier one stated of the same keys is replaced.
   void take(const ConfigLayer& layer) {
@@ -104,8 +104,8 @@ class Loader {
         take(*entry, node);
       } else if (const toml::table* inner = node.as_table(); inner != nullptr && is_table(path)) {
         walk(*inner, path + ".");
-      } else if (const std::string now = new_key(path); !now.empty()) {
-        problem(node, path, "is now called " + now);
+      } else if (const std::string became = what_became_of(path); !became.empty()) {
+        problem(node, path, became);
       } else {
         problem(node, path, "unknown key; the nearest valid one is " + nearest_key(path, entries_));
       }
@@ -121,23 +121,23 @@ class Loader {
     const auto is_inside = [&](const std::string& key) { return key.starts_with(path + "."); };
     return std::any_of(entries_.begin(), entries_.end(),
                        [&](const auto& entry) { return is_inside(entry.key); }) ||
-           std::any_of(renamed_.begin(), renamed_.end(),
-                       [&](const auto& old) { return old.key.empty() && is_inside(old.old_name); });
+           std::any_of(old_keys_.begin(), old_keys_.end(),
+                       [&](const auto& old) { return is_inside(old.name); });
   }
 
-  /// What a key of an older version is called now; empty where it was never one. The longest rule
+  /// What became of a key of an older version; empty where it was never one. The longest rule
   /// holds: a key that was renamed within a renamed table has a rule of its own.
-  std::string new_key(const std::string& path) const {
-    const ParameterTable::Renamed* best = nullptr;
-    for (const ParameterTable::Renamed& rule : renamed_) {
-      const bool is_whole_table = rule.old_name.ends_with('.');
-      const bool fits = is_whole_table ? path.starts_with(rule.old_name) : path == rule.old_name;
-      if (!rule.key.empty() || !fits) continue;
-      if (best == nullptr || rule.old_name.size() > best->old_name.size()) best = &rule;
+  std::string what_became_of(const std::string& path) const {
+    const ParameterTable::OldKey* best = nullptr;
+    for (const ParameterTable::OldKey& rule : old_keys_) {
+      const bool is_whole_table = rule.name.ends_with('.');
+      const bool fits = is_whole_table ? path.starts_with(rule.name) : path == rule.name;
+      if (fits && (best == nullptr || rule.name.size() > best->name.size())) best = &rule;
     }
     if (best == nullptr) return {};
-    if (!best->old_name.ends_with('.')) return best->new_name;
-    return best->new_name + path.substr(best->old_name.size());
+    if (best->new_name.empty()) return "was removed: " + best->why_removed;
+    if (!best->name.ends_with('.')) return "is now called " + best->new_name;
+    return "is now called " + best->new_name + path.substr(best->name.size());
   }
 
   void problem(const toml::node& node, const std::string& key, const std::string& what) {
@@ -178,14 +178,8 @@ class Loader {
     if (!node.is_string()) return refuse(entry, node, "is not text");
     const std::string& value = node.as_string()->get();
     const auto& choices = target.choices;
-    if (!choices.empty() && std::find(choices.begin(), choices.end(), value) == choices.end()) {
-      const auto rule = std::find_if(renamed_.begin(), renamed_.end(), [&](const auto& old) {
-        return old.key == entry.key && old.old_name == value;
-      });
-      if (rule == renamed_.end()) return refuse(entry, node, "is not known");
-      return problem(node, entry.key,
-                     fmt::format("\"{}\" is now called \"{}\"", value, rule->new_name));
-    }
+    if (!choices.empty() && std::find(choices.begin(), choices.end(), value) == choices.end())
+      return refuse(entry, node, "is not known");
     settings_.push_back({&entry, value});
   }
 
@@ -199,7 +193,7 @@ class Loader {
   }
 
   const std::vector<ParameterTable::Entry>& entries_;
-  const std::vector<ParameterTable::Renamed>& renamed_;
+  const std::vector<ParameterTable::OldKey>& old_keys_;
   std::string name_;
   std::vector<std::string> problems_;
   std::vector<Setting> settings_;
@@ -212,7 +206,7 @@ void ParameterTable::load(const std::filesystem::path& file) {
 }
 
 void ParameterTable::load_text(std::string_view toml, const std::string& name) {
-  Loader loader(entries_, renamed_);
+  Loader loader(entries_, old_keys_);
   for (const ConfigLayer& layer : config_layers(toml, name)) loader.take(layer);
   loader.finish();
 }

@@ -91,11 +91,10 @@ std::string allowed(const ParameterTable::Entry& entry) {
 }
 
 void ParameterTable::renamed(std::string old_key, std::string new_key) {
-  renamed_.push_back({"", std::move(old_key), std::move(new_key)});
+  old_keys_.push_back({std::move(old_key), std::move(new_key), {}});
 }
-void ParameterTable::renamed_choice(std::string key, std::string old_choice,
-                                    std::string new_choice) {
-  renamed_.push_back({std::move(key), std::move(old_choice), std::move(new_choice)});
+void ParameterTable::removed(std::string old_key, std::string why) {
+  old_keys_.push_back({std::move(old_key), {}, std::move(why)});
 }
 
 void ParameterTable::check_is_new(const std::string& key) const {

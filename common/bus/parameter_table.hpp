@@ -31,7 +31,7 @@ struct Range {
 };
 
 /// A list of parameters, each bound to a variable that holds its default when it is added. Keys are
-/// dotted paths of TOML tables, e.g. baseline.descriptor_step.
+/// dotted paths of TOML tables, e.g. joint.gate_sigmas.
 class ParameterTable {
  public:
   /// A real parameter with its default and range.
@@ -65,11 +65,11 @@ class ParameterTable {
     std::variant<Number, Integer, Boolean, Text> target;
   };
 
-  /// What an older version called `new_name`: a key, or a choice of the text parameter `key`.
-  struct Renamed {
-    std::string key;  ///< Empty where the key itself was renamed.
-    std::string old_name;
-    std::string new_name;
+  /// A key of an older version: what it is called now, or why there is none any more.
+  struct OldKey {
+    std::string name;      ///< Ends in "." where it is all keys of a TOML table.
+    std::string new_name;  ///< Empty where the key was removed.
+    std::string why_removed;
   };
 
   /// Adds a real parameter; `value` holds the default and must outlive the table. Throws
@@ -85,13 +85,14 @@ class ParameterTable {
   /// A key of an older version, which is refused with the new one in the message. Both may end in
   /// "." and then mean all keys of a TOML table.
   void renamed(std::string old_key, std::string new_key);
-  /// The same of a choice of a text parameter.
-  void renamed_choice(std::string key, std::string old_choice, std::string new_choice);
+  /// A key of an older version, or with "." at its end all keys of a TOML table, that is refused
+  /// with this reason: what does its work now.
+  void removed(std::string old_key, std::string why);
 
   /// All parameters in the order of adding.
   const std::vector<Entry>& entries() const { return entries_; }
-  /// All rules added by renamed() and renamed_choice().
-  const std::vector<Renamed>& renames() const { return renamed_; }
+  /// All rules added by renamed() and removed().
+  const std::vector<OldKey>& old_keys() const { return old_keys_; }
 
   /// Sets what the file states, on top of what the file states that its key `base` names; the rest
   /// keeps its default. Throws ConfigurationError with all that is wrong; then nothing has been
@@ -109,7 +110,7 @@ class ParameterTable {
   void check_is_new(const std::string& key) const;
 
   std::vector<Entry> entries_;
-  std::vector<Renamed> renamed_;
+  std::vector<OldKey> old_keys_;
 };
 
 /// "0.5", "true", "\"joint\"": the value as TOML, shortest form that reads back the same.

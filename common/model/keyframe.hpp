@@ -52,7 +52,7 @@ struct Keyframe {
   /// measurement.
   std::optional<geometry::SE2> previous_T_base;
   /// In order of member and detection, each once. Those of a scan that are not listed made no
-  /// landmark; the baseline keyframer lists none.
+  /// landmark; a keyframer of your own may list none.
   std::vector<KeyframeDetection> detections;
 
   /// Pose of the base. Precondition: there is a member.

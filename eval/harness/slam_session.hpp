@@ -1,21 +1,46 @@
 // Keyframer and mapper in one process, scan by scan, with the time that each takes.
 #pragma once
 
-#include <memory>
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "services/geoslam_mapper/geoslam_mapper.hpp"
-#include "services/keyframer/keyframer.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/landmarks.hpp"
+#include "common/model/map.hpp"
+#include "eval/harness/submap_shelf.hpp"
 
 namespace understory::eval::harness {
 
+/// What an experiment asks of a keyframer: the services' or a baseline's. None of them is empty.
+struct Keyframing {
+  /// Takes one scan; gives the keyframe that it completed, if any.
+  std::function<std::optional<model::Keyframe>(const model::LandmarkScan&)> add;
+  /// Keyframes that come before the one that `add` gave.
+  std::function<std::vector<model::Keyframe>()> take_waited;
+  /// Keyframes that were gathered, but not good enough to give out.
+  std::function<std::uint64_t()> withheld;
+};
+
+/// What an experiment asks of a mapper: the services' or a baseline's. None of them is empty.
+struct Mapping {
+  /// Localises the keyframe and fuses it.
+  std::function<model::MapUpdate(const model::Keyframe&)> add;
+  /// The pose of every keyframe's base, in order of time.
+  std::function<std::vector<model::KeyframePose>()> trajectory;
+  /// Every landmark of the map, in order of id.
+  std::function<std::vector<model::MapLandmark>()> landmarks;
+  /// Puts away what the mapper gave away, and gives back what it wants: after each keyframe.
+  std::function<void(SubmapShelf&)> exchange_submaps;
+};
+
 /// The two stages of one method.
 struct Stages {
-  std::unique_ptr<keyframer::KeyframerMethod> keyframer;
-  std::unique_ptr<geoslam_mapper::MapperMethod> mapper;
+  Keyframing keyframer;
+  Mapping mapper;
 };
 
 /// Names of the methods that make_stages() takes: "baseline", "smoothing".
@@ -36,7 +61,7 @@ struct KeyframeOutcome {
 /// Keyframer and mapper of one method, fed with scans in order of time.
 class SlamSession {
  public:
-  /// Takes the stages over, as they are: new or loaded.
+  /// Takes the stages over, as they are.
   explicit SlamSession(Stages stages);
 
   /// Takes one scan; gives what became of the keyframe that it completed, if any.
@@ -44,12 +69,8 @@ class SlamSession {
   /// True if the last scan completed a keyframe that the keyframer withheld.
   bool withheld_one() const { return withheld_one_; }
 
-  /// The mapper, to take what it gives away.
-  geoslam_mapper::MapperMethod& mapper() { return *stages_.mapper; }
   /// The mapper, to ask for its map.
-  const geoslam_mapper::MapperMethod& mapper() const { return *stages_.mapper; }
-  /// The keyframer, to ask for its counters.
-  const keyframer::KeyframerMethod& keyframer() const { return *stages_.keyframer; }
+  const Mapping& mapper() const { return stages_.mapper; }
 
  private:
   Stages stages_;

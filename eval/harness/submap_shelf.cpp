@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/wire/convert.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 
 namespace understory::eval::harness {
 namespace {
@@ -21,7 +22,7 @@ SubmapShelf::SubmapShelf() : file_(std::tmpfile(), &std::fclose) {
   if (!file_) throw std::runtime_error("no temporary file for submaps");
 }
 
-void SubmapShelf::serve(geoslam_mapper::MapperMethod& mapper) {
+void SubmapShelf::serve(geoslam_mapper::smoothing::SmoothingMapper& mapper) {
   for (const model::Submap& submap : mapper.take_given_away()) {
     for (const model::SubmapId id : submap.replaced) places_.at(id) = {};
     const auto bytes = wire::encode_message(submap);
@@ -51,7 +52,7 @@ model::Submap SubmapShelf::read(const Place& place) const {
 }
 
 std::vector<model::KeyframePose> SubmapShelf::keyframes(
-    const geoslam_mapper::MapperMethod& mapper) const {
+    const geoslam_mapper::smoothing::SmoothingMapper& mapper) const {
   std::vector<model::KeyframePose> result;
   for (const model::SubmapPose& pose : mapper.submap_poses()) {
     if (pose.id >= places_.size() || places_[pose.id].bytes == 0) continue;

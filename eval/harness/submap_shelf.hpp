@@ -7,8 +7,12 @@
 #include <utility>
 #include <vector>
 
+#include "common/model/map.hpp"
 #include "common/model/submap.hpp"
-#include "services/geoslam_mapper/mapper_method.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+class SmoothingMapper;
+}
 
 namespace understory::eval::harness {
 
@@ -20,9 +24,10 @@ class SubmapShelf {
 
   /// Takes what the mapper gave away and brings back what it wants; to be called after each
   /// keyframe. Throws std::runtime_error where the mapper refuses its own, or the disk is full.
-  void serve(geoslam_mapper::MapperMethod& mapper);
+  void serve(geoslam_mapper::smoothing::SmoothingMapper& mapper);
   /// The pose of every keyframe that is here, frame `map`.
-  std::vector<model::KeyframePose> keyframes(const geoslam_mapper::MapperMethod& mapper) const;
+  std::vector<model::KeyframePose> keyframes(
+      const geoslam_mapper::smoothing::SmoothingMapper& mapper) const;
   /// Number of landmarks that are here.
   std::size_t landmarks() const;
   /// Bytes of the submaps that are here.

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "common/hierarchy/baseline/hierarchy.hpp"
-#include "common/hierarchy/baseline/matching.hpp"
+#include "eval/baselines/hierarchy/hierarchy.hpp"
+#include "eval/baselines/hierarchy/matching.hpp"
 #include "eval/harness/results.hpp"
 
 namespace understory::eval::harness {
@@ -24,9 +24,9 @@ json points(const std::vector<Eigen::Vector2d>& all) {
   return result;
 }
 
-json polygons_of(const hierarchy::baseline::Hierarchy& hierarchy) {
+json polygons_of(const baselines::hierarchy::Hierarchy& hierarchy) {
   json result = json::array();
-  for (const hierarchy::baseline::Polygon& polygon : hierarchy.polygons())
+  for (const baselines::hierarchy::Polygon& polygon : hierarchy.polygons())
     result.push_back(polygon.vertices);
   return result;
 }
@@ -52,11 +52,11 @@ struct LocalMap {
 /// Both hierarchies as GeoSLAM builds them, and what their polygons match.
 void add_polygon_matches(const std::vector<Eigen::Vector2d>& local_m,
                          const std::vector<Eigen::Vector2d>& map_m, json& snapshot) {
-  const hierarchy::baseline::Hierarchy local(local_m, kDescriptorStep);
-  const hierarchy::baseline::Hierarchy map(map_m, kDescriptorStep);
+  const baselines::hierarchy::Hierarchy local(local_m, kDescriptorStep);
+  const baselines::hierarchy::Hierarchy map(map_m, kDescriptorStep);
   json first = json::array();
-  for (const hierarchy::baseline::PointMatch& match :
-       hierarchy::baseline::match_hierarchies(local, map, {})) {
+  for (const baselines::hierarchy::PointMatch& match :
+       baselines::hierarchy::match_hierarchies(local, map, {})) {
     first.push_back({match.local, match.other});
   }
   snapshot["keyframe_polygons"] = polygons_of(local);

@@ -1,17 +1,18 @@
 #include "services/geoslam_mapper/adapter.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "services/geoslam_mapper/adapter_parameters.hpp"
-#include "services/geoslam_mapper/geoslam_mapper.hpp"
 #include "services/geoslam_mapper/given_map.hpp"
 #include "services/geoslam_mapper/health_watch.hpp"
 #include "services/geoslam_mapper/lines_of_sight.hpp"
 #include "services/geoslam_mapper/map_difference.hpp"
 #include "services/geoslam_mapper/pose_stream.hpp"
 #include "services/geoslam_mapper/published_map.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 #include "services/geoslam_mapper/submap_exchange.hpp"
 #include "understory/map_request_t.hpp"
 
@@ -61,7 +62,7 @@ class MapperAdapter : public bus::Adapter {
 
   void bind(bus::Node& node) override {
     node_ = &node;
-    stage_ = make_mapper(parameters_);
+    stage_.emplace(parameters_);
     parts_ = empty_parts();
     if (!input_.map_file.empty()) begin_with(read_given_map(input_.map_file, input_.map_id));
     subscribe(node);
@@ -163,10 +164,12 @@ class MapperAdapter : public bus::Adapter {
   }
 
   void subscribe_to_store(bus::Node& node) {
-    node.subscribe<model::SubmapStored>(
-        channels_.submap_stored,
-        [this](const model::SubmapStored& stored) { parts_->exchange.on_stored(stored, *stage_); },
-        {.queue_size = 200});
+    node.subscribe<model::SubmapStored>(channels_.submap_stored,
+                                        [this](const model::SubmapStored& stored) {
+                                          parts_->exchange.on_stored(stored);
+                                          stage_->may_hand_over(parts_->exchange.keeps_up());
+                                        },
+                                        {.queue_size = 200});
     node.subscribe<model::Submap>(channels_.submap_reply,
                                   [this](const model::Submap& submap) { on_reply(submap); },
                                   {.queue_size = 50, .most_bytes = submap_bytes(kSubmapLandmarks)});
@@ -187,26 +190,31 @@ class MapperAdapter : public bus::Adapter {
     results_.publish(result);
   }
 
+  /// An answer may come twice: then the submap is not wanted any more.
   void on_reply(const model::Submap& submap) {
-    report_refused(parts_->exchange.on_reply(submap, *stage_, parts_->map));
-  }
-
-  void report_refused(const std::string& refused) {
-    if (!refused.empty())
-      node_->report(wire::Reason::kInputRefused, refused, channels_.submap_reply);
+    const std::vector<model::SubmapId> wanted = stage_->wanted();
+    if (std::ranges::find(wanted, submap.id) == wanted.end()) return;
+    const std::string refused = stage_->bring_back(submap);
+    if (refused.empty()) return parts_->map.take_back(submap);
+    node_->report(wire::Reason::kInputRefused, refused, channels_.submap_reply);
   }
 
   void exchange_submaps(model::Utime now) {
-    const auto messages = parts_->exchange.on_keyframe(now, *stage_, parts_->map);
+    std::vector<model::Submap> given_away = stage_->take_given_away();
+    for (const model::Submap& submap : given_away) parts_->map.give_away(submap);
+    const auto messages = parts_->exchange.on_keyframe(now, std::move(given_away), stage_->wanted(),
+                                                       parts_->map.map_id());
     for (const model::Submap& submap : messages.submaps) parts_->map.earn(submaps_.publish(submap));
-    for (const std::string& refused : messages.refused) report_refused(refused);
+    for (const model::Submap& submap : messages.waited) on_reply(submap);
     if (!messages.query.ids.empty()) queries_.publish(messages.query);
+    stage_->may_hand_over(parts_->exchange.keeps_up());
     parts_->health.keeps_up(parts_->exchange.keeps_up());
   }
 
   void publish_correction(model::Utime now, bool is_last) {
-    if (const auto correction = parts_->exchange.correction(*stage_, parts_->map, now, is_last))
-      parts_->map.earn(corrections_.publish(*correction));
+    if (!is_last && !parts_->exchange.is_correction_due(now)) return;
+    if (const auto one = parts_->exchange.correction(stage_->submap_poses(), parts_->map, is_last))
+      parts_->map.earn(corrections_.publish(*one));
   }
 
   /// Only in the beginning: a map that exists is not replaced.
@@ -219,7 +227,7 @@ class MapperAdapter : public bus::Adapter {
   }
 
   void begin_with(const model::WholeMap& map) {
-    stage_->start_with(apart_from_keyframes(map, parameters_.smoothing.given_map_sigma_m));
+    stage_->start_with(apart_from_keyframes(map, parameters_.given_map_sigma_m));
     (void)stage_->take_changed_landmarks();
     parts_->poses.begin_in(map);
     parts_->map.begin_with(stage_->landmarks());
@@ -268,22 +276,23 @@ class MapperAdapter : public bus::Adapter {
 
   void publish_poses(const model::Keyframe& keyframe, const model::MapUpdate& update,
                      bool is_new_map) {
-    const auto made =
-        parts_->poses.on_keyframe(keyframe, update, is_new_map, stage_->locates_scans());
+    const auto made = parts_->poses.on_keyframe(keyframe, update, is_new_map);
     const auto bytes = static_cast<std::size_t>(slam_pose2_t{}.getEncodedSize());
     for (std::size_t i = 0; i < made.counted; ++i) parts_->map.earn(bytes);
     for (const model::SlamPose& pose : made.poses) poses_.publish(pose);
   }
 
   void publish_delta(const model::MapUpdate& update, bool is_new_map) {
-    const auto delta = parts_->map.on_update(update, *stage_);
+    const auto delta = parts_->map.on_update(
+        update, stage_->take_changed_landmarks(),
+        [this](std::span<model::MapLandmark> landmarks) { stage_->set_covariances(landmarks); });
     if (!delta) return;
     parts_->map.earn(deltas_.publish(*delta));
     if (is_new_map) publish_map();
   }
 
   model::WholeMap whole_map() const {
-    model::WholeMap map = parts_->map.whole(*stage_);
+    model::WholeMap map = parts_->map.whole(stage_->landmarks(), stage_->trajectory());
     for (model::KeyframePose& one : map.keyframes)
       one.covariance += parts_->poses.given_covariance_at(one.map_T_vehicle, parts_->map.map_id());
     return map;
@@ -298,11 +307,11 @@ class MapperAdapter : public bus::Adapter {
   }
 
   MapperChannels channels_;
-  MapperParameters parameters_;
+  SmoothingMapperParameters parameters_;
   MapperInputParameters input_;
   MapperOutputParameters output_;
   HealthParameters health_;
-  std::unique_ptr<MapperMethod> stage_;
+  std::optional<smoothing::SmoothingMapper> stage_;
   bus::Node* node_ = nullptr;
   std::optional<Parts> parts_;
   bus::Publisher<model::SlamPose> poses_;

@@ -3,47 +3,6 @@
 namespace understory::geoslam_mapper {
 namespace {
 
-void describe_baseline(BaselineMapperParameters& p, bus::ParameterTable& table) {
-  table.add("baseline.descriptor_step", p.descriptor_step, {0.001, 0.5}, "of the perimeter",
-            "[s] Step at which a polygon's outline is sampled.");
-  table.add("baseline.max_side_difference", p.max_side_difference, {0, 100}, "",
-            "[Delta_N] Polygons whose numbers of sides differ by more do not match.");
-  table.add("baseline.min_triangle_match_ratio", p.min_triangle_match_ratio, {0.0, 1.0}, "",
-            "[eta] Share of triangles that must match inside a matched polygon.");
-  table.add("baseline.initial_descriptor_distance", p.initial_descriptor_distance, {0.0, 1000.0},
-            "m", "[tau] Largest descriptor distance of a match, in the first attempt.");
-  table.add("baseline.descriptor_distance_step", p.descriptor_distance_step, {0.001, 1000.0}, "m",
-            "[psi] Increment of that distance from attempt to attempt.");
-  table.add("baseline.max_descriptor_distance", p.max_descriptor_distance, {0.0, 1000.0}, "m",
-            "Largest descriptor distance of all attempts.");
-
-  table.add("baseline.min_associations", p.min_associations, {2, 10000}, "",
-            "[gamma] Fewest associations with which a pose is tried.");
-  table.add("baseline.max_pose_attempts", p.max_pose_attempts, {1, 1000000}, "",
-            "[alpha] Most samples drawn for a pose.");
-  table.add("baseline.pose_sample_size", p.pose_sample_size, {2, 100}, "",
-            "[xi] Associations in one sample.");
-  table.add("baseline.association_distance_m", p.association_distance_m, {0.001, 100.0}, "m",
-            "[Lambda] Largest distance of an inlier.");
-  table.add("baseline.discovery_distance_m", p.discovery_distance_m, {0.001, 1000.0}, "m",
-            "[rho] A detection farther than this from the map may be new.");
-  table.add("baseline.sensor_range_m", p.sensor_range_m, {0.1, 10000.0}, "m",
-            "[r] Range of the sensor.");
-  table.add("baseline.min_pose_associations", p.min_pose_associations, {2, 10000}, "",
-            "[mu] Fewest inliers of a pose.");
-  table.add("baseline.early_exit_ratio", p.early_exit_ratio, {0.0, 1.0}, "",
-            "[beta] Share of inliers at which no more samples are drawn.");
-
-  table.add("baseline.discovery_observations", p.discovery_observations, {1, 1000}, "keyframes",
-            "[k] A new landmark must be observed in so many keyframes ...");
-  table.add("baseline.discovery_window", p.discovery_window, {1, 1000}, "keyframes",
-            "[omega] ... of the last so many.");
-  table.add("baseline.discovery_association_m", p.discovery_association_m, {0.001, 100.0}, "m",
-            "[delta] Observations this near to each other, per axis, are of one new landmark.");
-  table.add("baseline.max_newest_pose_error", p.max_newest_pose_error, {0.0, 1e12}, "",
-            "Squared error of the newest pose beyond which the update is rolled back.");
-}
-
 void describe_evidence(SmoothingMapperParameters& p, bus::ParameterTable& table) {
   table.add("smoothing.use_odometry", p.use_odometry,
             "Use ODOMETRY between keyframes as a measurement.");
@@ -172,29 +131,27 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
             "uncertain. 0: the whole map is kept.");
 }
 
-void describe_renamed(bus::ParameterTable& table) {
-  table.renamed("source.", "baseline.");
+void describe_old_keys(bus::ParameterTable& table) {
   table.renamed("ours.", "smoothing.");
   table.renamed("ours.lasting_share", "smoothing.correlated_share");
   table.renamed("ours.lasting_m", "smoothing.correlation_m");
   table.renamed("ours.standing_share", "smoothing.stationary_share");
   table.renamed("ours.min_sightings", "smoothing.min_observations");
   table.renamed("ours.min_sighting_ratio", "smoothing.min_observation_ratio");
-  table.renamed_choice("method", "source", "baseline");
-  table.renamed_choice("method", "ours", "smoothing");
+  // The thesis's method was a choice of the mapper.
+  const std::string where = "the method of the GeoSLAM thesis runs in understory eval alone";
+  table.removed("method", "the mapper has one method now; " + where);
+  table.removed("baseline.", where);
+  table.removed("source.", where);
 }
 
 }  // namespace
 
-void describe(MapperParameters& parameters, bus::ParameterTable& table) {
-  table.add("method", parameters.method, {"smoothing", "baseline"},
-            "smoothing: incremental smoothing with covariances; baseline: the method of the "
-            "GeoSLAM thesis.");
-  describe_evidence(parameters.smoothing, table);
-  describe_association(parameters.smoothing, table);
-  describe_growth(parameters.smoothing, table);
-  describe_baseline(parameters.baseline, table);
-  describe_renamed(table);
+void describe(SmoothingMapperParameters& parameters, bus::ParameterTable& table) {
+  describe_evidence(parameters, table);
+  describe_association(parameters, table);
+  describe_growth(parameters, table);
+  describe_old_keys(table);
 }
 
 void describe(MapperInputParameters& parameters, bus::ParameterTable& table) {

@@ -8,7 +8,8 @@
 
 namespace understory::geoslam_mapper {
 
-/// What to begin with, and how much one message may hold; documented as MapperParameters is.
+/// What to begin with, and how much one message may hold; documented as SmoothingMapperParameters
+/// is.
 struct MapperInputParameters {
   std::string map_file;  ///< Empty: none.
   int map_id = 0;        ///< 0: the only one in the file with landmarks.
@@ -17,7 +18,7 @@ struct MapperInputParameters {
   int max_given_landmarks = 200000;
 };
 
-/// What the adapter decides itself; documented as MapperParameters is.
+/// What the adapter decides itself; documented as SmoothingMapperParameters is.
 struct MapperOutputParameters {
   double map_period_s = 2.0;
   double map_share = 0.1;  ///< Of all bytes that the mapper sends.
@@ -27,8 +28,8 @@ struct MapperOutputParameters {
   double oldest_pose_s = 0.05;
 };
 
-/// Adds the parameters of the methods to the table, with their older names.
-void describe(MapperParameters& parameters, bus::ParameterTable& table);
+/// Adds the parameters of the method to the table, with their older names.
+void describe(SmoothingMapperParameters& parameters, bus::ParameterTable& table);
 /// Adds the parameters of the inputs to the table.
 void describe(MapperInputParameters& parameters, bus::ParameterTable& table);
 /// Adds the parameters of the outputs to the table.

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
-#include "services/geoslam_mapper/mapper_method.hpp"
+#include "services/geoslam_mapper/mapper_output.hpp"
 
 namespace understory::geoslam_mapper {
 namespace {
@@ -16,8 +15,7 @@ constexpr double kMostFarAway_m = 0.10;
 /// Whether a subscriber that has `told` must hear of `now`.
 bool has_moved(const model::MapLandmark& told, const model::MapLandmark& now,
                const MapTolerance& tolerance) {
-  const bool is_around =
-      (now.position_m - tolerance.vehicle_m).norm() < MapperMethod::kAroundVehicle_m;
+  const bool is_around = (now.position_m - tolerance.vehicle_m).norm() < kAroundVehicle_m;
   const double sigma_m = std::sqrt(std::max(0.0, 0.5 * told.covariance_m2.trace()));
   const double most_m =
       std::min(is_around ? kMostAround_m : kMostFarAway_m, kMovedSigmas * sigma_m);
@@ -33,34 +31,6 @@ auto first_not_below(Landmarks& landmarks, model::LandmarkId id) {
 }
 
 }  // namespace
-
-model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
-                               const std::vector<model::MapLandmark>& after,
-                               const model::MapUpdate& update, const MapTolerance& tolerance) {
-  model::MapDelta delta;
-  delta.utime = update.utime;
-  delta.merged = update.merged;
-
-  std::set<model::LandmarkId> merged;
-  for (const auto& [old_id, new_id] : update.merged) merged.insert(old_id);
-
-  auto old = before.begin();
-  const auto gone = [&](const model::MapLandmark& landmark) {
-    if (!merged.contains(landmark.id)) delta.removed.push_back(landmark.id);
-  };
-
-  for (const model::MapLandmark& landmark : after) {
-    while (old != before.end() && old->id < landmark.id) gone(*old++);
-    if (old == before.end() || old->id != landmark.id) {
-      delta.added.push_back(landmark);
-      continue;
-    }
-    if (has_moved(*old, landmark, tolerance)) delta.moved.push_back(landmark);
-    ++old;
-  }
-  while (old != before.end()) gone(*old++);
-  return delta;
-}
 
 model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
                            const std::vector<model::MapLandmark>& changed,

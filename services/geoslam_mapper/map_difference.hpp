@@ -17,15 +17,9 @@ struct MapTolerance {
   Eigen::Vector2d vehicle_m = Eigen::Vector2d::Zero();  ///< Frame map.
 };
 
-/// What leads from `before` to `after`, both in order of id; the old ids of `update.merged` count
-/// as merged, not as removed. A subscriber is within the tolerance of the mapper. O(map).
-model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
-                               const std::vector<model::MapLandmark>& after,
-                               const model::MapUpdate& update, const MapTolerance& tolerance);
-
-/// The same from those landmarks alone that are new, have moved or are around the vehicle, in order
-/// of id; those that are gone must be in `update.merged` or `update.removed`.
-/// O(changed * log(map)).
+/// What leads from `before` to the map with `changed`, both in order of id: the landmarks that are
+/// new, have moved or are around the vehicle. Those that are gone must be in `update.merged` or
+/// `update.removed`. A subscriber is within the tolerance of the mapper. O(changed * log(map)).
 model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
                            const std::vector<model::MapLandmark>& changed,
                            const model::MapUpdate& update, const MapTolerance& tolerance);

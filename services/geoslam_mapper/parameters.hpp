@@ -1,35 +1,11 @@
-// Parameters of the methods of mapping. What each one does, with range and default, is documented
+// Parameters of the mapper. What each one does, with range and default, is documented
 // once: in adapter_parameters.cpp, which `understory-geoslam-mapper --help` prints. Here stand the
 // units that a name does not give.
 #pragma once
 
-#include <string>
-
 namespace understory::geoslam_mapper {
 
-/// The thesis's method (GeoSLAM Table 5.3). Symbols of the thesis in brackets.
-struct BaselineMapperParameters {
-  double descriptor_step = 0.05;             ///< [s] Share of the perimeter.
-  int max_side_difference = 3;               ///< [Delta_N]
-  double min_triangle_match_ratio = 0.5;     ///< [eta]
-  double initial_descriptor_distance = 2.0;  ///< [tau] m
-  double descriptor_distance_step = 0.5;     ///< [psi] m
-  double max_descriptor_distance = 10.0;     ///< m
-  int min_associations = 16;                 ///< [gamma]
-  int max_pose_attempts = 75;                ///< [alpha]
-  int pose_sample_size = 2;                  ///< [xi]
-  double association_distance_m = 0.2;       ///< [Lambda]
-  double discovery_distance_m = 2.5;         ///< [rho]
-  double sensor_range_m = 40.0;              ///< [r]
-  int min_pose_associations = 6;             ///< [mu]
-  double early_exit_ratio = 0.9;             ///< [beta]
-  int discovery_observations = 4;            ///< [k] Keyframes.
-  int discovery_window = 5;                  ///< [omega] Keyframes.
-  double discovery_association_m = 0.5;      ///< [delta]
-  double max_newest_pose_error = 10000.0;    ///< Rollback threshold, GeoSLAM §5.3; chi^2.
-};
-
-/// The project's method: incremental smoothing with covariances.
+/// Of incremental smoothing with covariances.
 struct SmoothingMapperParameters {
   // Evidence.
   bool use_odometry = false;
@@ -77,13 +53,6 @@ struct SmoothingMapperParameters {
   double cut_longest_m = 500.0;
   int cut_size = 0;  ///< Nodes and landmarks.
   double hand_over_m = 0.0;
-};
-
-/// Which method, and the parameters of each.
-struct MapperParameters {
-  std::string method = "smoothing";  ///< "smoothing" or "baseline".
-  BaselineMapperParameters baseline;
-  SmoothingMapperParameters smoothing;
 };
 
 }  // namespace understory::geoslam_mapper

@@ -22,8 +22,7 @@ std::optional<model::SlamPose> PoseStream::on_scan(const model::LandmarkScan& sc
 }
 
 PoseStream::OfKeyframe PoseStream::on_keyframe(const model::Keyframe& keyframe,
-                                               const model::MapUpdate& update, bool is_new_map,
-                                               bool locates_scans) {
+                                               const model::MapUpdate& update, bool is_new_map) {
   is_provisional_ = update.is_provisional;
   jumps_.add(keyframe, update);
 
@@ -35,7 +34,7 @@ PoseStream::OfKeyframe PoseStream::on_keyframe(const model::Keyframe& keyframe,
       ++result.counted;
     }
     // Keyframes may share scans; the stamp always grows.
-    const bool is_stale = locates_scans && newest_scan_us_ - pose.utime > oldest_us;
+    const bool is_stale = newest_scan_us_ - pose.utime > oldest_us;
     if (pose.utime <= newest_utime_ || is_stale) continue;
     pose.is_new_map = is_new_map;
     complete(pose);

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "services/geoslam_mapper/given_map.hpp"
-#include "services/geoslam_mapper/mapper_method.hpp"
+#include "services/geoslam_mapper/mapper_output.hpp"
 #include "services/geoslam_mapper/pose_publishing.hpp"
 
 namespace understory::geoslam_mapper {
@@ -52,11 +52,10 @@ class PoseStream {
     /// after a restart.
     std::size_t counted = 0;
   };
-  /// `is_new_map`: it began another map than the last one's. `locates_scans`:
-  /// on_scan() is called with the scans as they come; those of a keyframe that
-  /// began a map, or found a lost vehicle, are the past then.
+  /// `is_new_map`: it began another map than the last one's. The scans of a
+  /// keyframe that began a map, or found a lost vehicle, are the past.
   OfKeyframe on_keyframe(const model::Keyframe& keyframe, const model::MapUpdate& update,
-                         bool is_new_map, bool locates_scans);
+                         bool is_new_map);
 
   /// What is not known of the given map's frame there; nothing where the
   /// vehicle left that map.

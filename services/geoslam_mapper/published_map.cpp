@@ -1,6 +1,7 @@
 #include "services/geoslam_mapper/published_map.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/model/held_map.hpp"
 #include "common/wire/convert.hpp"
@@ -21,20 +22,14 @@ void PublishedMap::begin_with(std::vector<model::MapLandmark> landmarks) {
   must_send_ = true;
 }
 
-model::MapDelta PublishedMap::difference(const model::MapUpdate& update,
-                                         MapperMethod& mapper) const {
-  const MapTolerance tolerance{limits_.moved_m, update.map_T_vehicle.translation()};
-  const auto changed = mapper.take_changed_landmarks();
-  return changed ? map_change(landmarks_, *changed, update, tolerance)
-                 : map_difference(landmarks_, mapper.landmarks(), update, tolerance);
-}
-
-std::optional<model::MapDelta> PublishedMap::on_update(const model::MapUpdate& update,
-                                                       MapperMethod& mapper) {
+std::optional<model::MapDelta> PublishedMap::on_update(
+    const model::MapUpdate& update, const std::vector<model::MapLandmark>& changed,
+    const SetCovariances& set_covariances) {
   const bool begins_another = is_another(update);
   map_id_ = update.map_id;
   if (begins_another) landmarks_.clear();
-  model::MapDelta delta = difference(update, mapper);
+  model::MapDelta delta = map_change(landmarks_, changed, update,
+                                     {limits_.moved_m, update.map_T_vehicle.translation()});
 
   utime_ = std::max(utime_, update.utime);
   if (begins_another) keyframes_ = 0;
@@ -46,8 +41,8 @@ std::optional<model::MapDelta> PublishedMap::on_update(const model::MapUpdate& u
   const bool changes = !delta.added.empty() || !delta.moved.empty() || !delta.removed.empty() ||
                        !delta.merged.empty();
   if (!changes) return std::nullopt;
-  mapper.set_covariances(delta.added);
-  mapper.set_covariances(delta.moved);
+  set_covariances(delta.added);
+  set_covariances(delta.moved);
 
   // Another map builds on nothing; versions are never used again.
   delta.base_version = begins_another ? 0 : version_;
@@ -79,12 +74,13 @@ void PublishedMap::sent(std::size_t bytes) {
   must_send_ = false;
 }
 
-model::WholeMap PublishedMap::whole(const MapperMethod& mapper) const {
+model::WholeMap PublishedMap::whole(std::vector<model::MapLandmark> landmarks,
+                                    std::vector<model::KeyframePose> keyframes) const {
   model::WholeMap map;
   map.utime = utime_;
   map.version = version_;
-  map.landmarks = mapper.landmarks();
-  map.keyframes = mapper.trajectory();
+  map.landmarks = std::move(landmarks);
+  map.keyframes = std::move(keyframes);
   return map;
 }
 

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/model/slam_output.hpp"
 #include "common/model/submap.hpp"
 #include "services/geoslam_mapper/map_budget.hpp"
-#include "services/geoslam_mapper/mapper_method.hpp"
 
 namespace understory::geoslam_mapper {
 
@@ -42,10 +43,14 @@ class PublishedMap {
 
   /// The mapper starts with these landmarks, in order of id and at least one.
   void begin_with(std::vector<model::MapLandmark> landmarks);
+  /// Puts the covariances into landmarks of the map as it is.
+  using SetCovariances = std::function<void(std::span<model::MapLandmark>)>;
   /// The next keyframe: what the subscribers must be told of it, if anything.
-  /// `mapper` has taken it. O(changed * log(map)) where the mapper tracks
-  /// changes, else O(map).
-  std::optional<model::MapDelta> on_update(const model::MapUpdate& update, MapperMethod& mapper);
+  /// `changed`: landmarks that are new, have moved or are around the vehicle,
+  /// in order of id, without covariances. O(changed * log(map)).
+  std::optional<model::MapDelta> on_update(const model::MapUpdate& update,
+                                           const std::vector<model::MapLandmark>& changed,
+                                           const SetCovariances& set_covariances);
   /// The mapper gave a submap away: it changes no more, and nobody is told that
   /// it went. O(map).
   void give_away(const model::Submap& submap);
@@ -60,8 +65,9 @@ class PublishedMap {
   bool is_due() const;
   /// MAP was sent without a request, with so many bytes.
   void sent(std::size_t bytes);
-  /// The message for MAP. Poses are known no better than the mapper states.
-  model::WholeMap whole(const MapperMethod& mapper) const;
+  /// The message for MAP, with what the mapper has.
+  model::WholeMap whole(std::vector<model::MapLandmark> landmarks,
+                        std::vector<model::KeyframePose> keyframes) const;
 
   /// Members of a saved state; see common/state. The limits are configuration.
   template <class Archive, class Self>
@@ -71,8 +77,6 @@ class PublishedMap {
   }
 
  private:
-  model::MapDelta difference(const model::MapUpdate& update, MapperMethod& mapper) const;
-
   Limits limits_;
   MapBudget budget_;
   model::Utime utime_ = 0;

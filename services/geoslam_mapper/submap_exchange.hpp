@@ -2,12 +2,12 @@
 // directions.
 #pragma once
 
+#include <cstdint>
 #include <optional>
-#include <string>
+#include <utility>
 #include <vector>
 
 #include "services/geoslam_mapper/hand_over.hpp"
-#include "services/geoslam_mapper/mapper_method.hpp"
 #include "services/geoslam_mapper/published_map.hpp"
 
 namespace understory::geoslam_mapper {
@@ -19,26 +19,27 @@ class SubmapExchange {
   /// What follows from a keyframe.
   struct Messages {
     std::vector<model::Submap> submaps;  ///< To be published.
-    std::vector<std::string> refused;    ///< Why the mapper did not take back what waited.
+    std::vector<model::Submap> waited;   ///< Wanted, and not yet with the store: for the mapper.
     model::SubmapQuery query;            ///< To be published where it has ids.
   };
-  /// After a keyframe. The mapper may give away more as long as a store keeps
-  /// up.
-  Messages on_keyframe(model::Utime utime, MapperMethod& mapper, PublishedMap& map);
+  /// After a keyframe: what the mapper gave away with it, and what it wants
+  /// back. `map_id`: of the map in use.
+  Messages on_keyframe(model::Utime utime, std::vector<model::Submap> given_away,
+                       const std::vector<model::SubmapId>& wanted, std::uint32_t map_id);
   /// The store has a submap.
-  void on_stored(const model::SubmapStored& stored, MapperMethod& mapper);
-  /// The answer to a query; it may come twice: then the submap is not away any
-  /// more. Returns why the mapper does not take it; empty where it does, or
-  /// does not want it.
-  std::string on_reply(const model::Submap& submap, MapperMethod& mapper, PublishedMap& map) const;
-  /// Whether a store keeps up.
+  void on_stored(const model::SubmapStored& stored) { hand_over_.confirm(stored); }
+  /// Whether a store keeps up: as long as it does, the mapper may give away
+  /// more.
   bool keeps_up() const { return hand_over_.may_hand_over(); }
 
-  /// The message for MAP_CORRECTION, where it is time and a submap has moved or
-  /// is new. `is_last`: at the end of the drive, by any distance.
-  std::optional<model::MapCorrection> correction(const MapperMethod& mapper,
-                                                 const PublishedMap& map, model::Utime now,
-                                                 bool is_last);
+  /// Whether it is time to look where the submaps are.
+  bool is_correction_due(model::Utime now) const { return corrections_.is_due(now); }
+  /// The message for MAP_CORRECTION, where a submap has moved or is new.
+  /// `is_last`: at the end of the drive, by any distance.
+  std::optional<model::MapCorrection> correction(std::vector<model::SubmapPose> poses,
+                                                 const PublishedMap& map, bool is_last) {
+    return corrections_.next(map.utime(), map.map_id(), std::move(poses), is_last);
+  }
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>

@@ -4,10 +4,11 @@
 
 #include <memory>
 #include <numbers>
+#include <optional>
 
 #include "services/keyframer/adapter_parameters.hpp"
 #include "services/keyframer/health_watch.hpp"
-#include "services/keyframer/keyframer.hpp"
+#include "services/keyframer/joint/joint_keyframer.hpp"
 
 namespace understory::keyframer {
 namespace {
@@ -25,7 +26,7 @@ class KeyframerAdapter : public bus::Adapter {
 
   void bind(bus::Node& node) override {
     node_ = &node;
-    stage_ = make_keyframer(parameters_);
+    stage_.emplace(parameters_.joint);
     watch_ = HealthWatch(health_);
 
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
@@ -98,7 +99,7 @@ class KeyframerAdapter : public bus::Adapter {
   HealthParameters health_;
   HealthWatch watch_;
   bus::Node* node_ = nullptr;
-  std::unique_ptr<KeyframerMethod> stage_;
+  std::optional<joint::JointKeyframer> stage_;
   bus::Publisher<model::Keyframe> keyframes_;
 };
 

@@ -6,7 +6,7 @@
 
 #include "common/bus/condition.hpp"
 #include "common/model/landmarks.hpp"
-#include "services/keyframer/keyframer_method.hpp"
+#include "services/keyframer/reports.hpp"
 
 namespace understory::keyframer {
 

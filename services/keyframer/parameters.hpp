@@ -1,24 +1,9 @@
 // The keyframer's parameters. Ranges and the texts of --help are in adapter_parameters.cpp.
 #pragma once
 
-#include <string>
-
 #include "common/model/detection_noise.hpp"
 
 namespace understory::keyframer {
-
-/// The thesis's method, with the values of GeoSLAM Table 5.2. Symbols of the thesis in brackets.
-struct BaselineKeyframerParameters {
-  double descriptor_step = 0.05;            ///< [s] Sampling step, as a share of the perimeter.
-  double max_descriptor_distance = 9.0;     ///< [tau] Limit for two polygons to match, m.
-  int max_side_difference = 3;              ///< [Delta_N] Limit on the difference of sides.
-  double min_triangle_match_ratio = 0.5;    ///< [eta] Least share of matched triangles.
-  int min_associations = 7;                 ///< [gamma] Least number of matched landmarks.
-  double max_association_distance_m = 1.0;  ///< [lambda]
-  double cluster_tolerance_m = 1.0;         ///< [sigma]
-  int observations_per_keyframe = 8;        ///< [n] Scans.
-  int stale_after_observations = 3;         ///< [f] Scans.
-};
 
 /// The joint estimate of member poses and local landmarks.
 struct JointKeyframerParameters {
@@ -33,11 +18,9 @@ struct JointKeyframerParameters {
   model::DetectionNoiseParameters noise;
 };
 
-/// Parameters of the process: the method and the parameters of each method.
+/// Parameters of the process.
 struct KeyframerParameters {
-  std::string method = "joint";  ///< "joint" or "baseline".
-  int max_detections = 2000;     ///< Of one LANDMARKS message.
-  BaselineKeyframerParameters baseline;
+  int max_detections = 2000;  ///< Of one LANDMARKS message.
   JointKeyframerParameters joint;
 };
 

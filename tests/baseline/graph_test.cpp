@@ -1,4 +1,4 @@
-#include "services/geoslam_mapper/baseline/graph.hpp"
+#include "eval/baselines/mapper/graph.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace understory::test {
 namespace {
 
-Eigen::VectorXd flatten(const geoslam_mapper::baseline::Graph& graph) {
+Eigen::VectorXd flatten(const eval::baselines::mapper::Graph& graph) {
   Eigen::VectorXd x(3 * static_cast<Eigen::Index>(graph.poses.size()) +
                     2 * static_cast<Eigen::Index>(graph.landmarks_m.size()));
   Eigen::Index at = 0;
@@ -25,19 +25,19 @@ Eigen::VectorXd flatten(const geoslam_mapper::baseline::Graph& graph) {
   return x;
 }
 
-Eigen::VectorXd residuals(const geoslam_mapper::baseline::Graph& graph, const Eigen::VectorXd& x) {
+Eigen::VectorXd residuals(const eval::baselines::mapper::Graph& graph, const Eigen::VectorXd& x) {
   const auto pose = [&](std::uint32_t i) { return Eigen::Vector3d(x.segment<3>(3L * i)); };
   const auto first_landmark = 3 * static_cast<Eigen::Index>(graph.poses.size());
   std::vector<double> all;
 
-  for (const geoslam_mapper::baseline::PoseEdge& edge : graph.pose_edges) {
+  for (const eval::baselines::mapper::PoseEdge& edge : graph.pose_edges) {
     const auto to_se2 = [](const Eigen::Vector3d& p) { return geometry::SE2(p.x(), p.y(), p.z()); };
     const geometry::SE2 error = to_se2(edge.difference).inverse() *
                                 (to_se2(pose(edge.from)).inverse() * to_se2(pose(edge.to)));
     all.insert(all.end(), {error.x(), error.y(), error.theta()});
   }
 
-  for (const geoslam_mapper::baseline::LandmarkEdge& edge : graph.landmark_edges) {
+  for (const eval::baselines::mapper::LandmarkEdge& edge : graph.landmark_edges) {
     const Eigen::Vector3d p = pose(edge.pose);
     const Eigen::Vector2d landmark = x.segment<2>(first_landmark + 2L * edge.landmark);
     const Eigen::Vector2d error =
@@ -49,7 +49,7 @@ Eigen::VectorXd residuals(const geoslam_mapper::baseline::Graph& graph, const Ei
 
 /// The whole dense system with a Jacobian from five-point differences: the prior is weak, so their
 /// error counts.
-Eigen::VectorXd dense_step(const geoslam_mapper::baseline::Graph& graph) {
+Eigen::VectorXd dense_step(const eval::baselines::mapper::Graph& graph) {
   const Eigen::VectorXd x = flatten(graph);
   const Eigen::VectorXd r = residuals(graph, x);
   Eigen::MatrixXd jacobian(r.size(), x.size());
@@ -69,10 +69,10 @@ Eigen::VectorXd dense_step(const geoslam_mapper::baseline::Graph& graph) {
   return h.ldlt().solve(100.0 * jacobian.transpose() * r);
 }
 
-geoslam_mapper::baseline::Graph random_graph(bool with_double_edges, std::mt19937_64& random) {
+eval::baselines::mapper::Graph random_graph(bool with_double_edges, std::mt19937_64& random) {
   std::normal_distribution<double> noise(0.0, 0.2);
   std::uniform_real_distribution<double> chance(0.0, 1.0);
-  geoslam_mapper::baseline::Graph graph;
+  eval::baselines::mapper::Graph graph;
   graph.landmarks_m = test::random_cloud(12, 40.0, random);
 
   for (std::uint32_t p = 0; p < 5; ++p) {
@@ -98,10 +98,10 @@ TEST_CASE("A step solves the whole linear system, also with two edges from one p
   std::mt19937_64 random(1);
   for (const bool with_double_edges : {false, true}) {
     for (int round = 0; round < 20; ++round) {
-      const geoslam_mapper::baseline::Graph graph = random_graph(with_double_edges, random);
+      const eval::baselines::mapper::Graph graph = random_graph(with_double_edges, random);
       const auto step = gauss_newton_step(graph);
       REQUIRE(step);
-      geoslam_mapper::baseline::Graph found;
+      eval::baselines::mapper::Graph found;
       found.poses = step->poses;
       found.landmarks_m = step->landmarks_m;
       CHECK((flatten(found) - dense_step(graph)).norm() < 1e-5);
@@ -111,7 +111,7 @@ TEST_CASE("A step solves the whole linear system, also with two edges from one p
 
 TEST_CASE("Pose 0 stays where it is") {
   std::mt19937_64 random(2);
-  const geoslam_mapper::baseline::Graph graph = random_graph(true, random);
+  const eval::baselines::mapper::Graph graph = random_graph(true, random);
   const auto step = gauss_newton_step(graph);
   REQUIRE(step);
   CHECK(step->poses[0].norm() < 1e-9);
@@ -119,7 +119,7 @@ TEST_CASE("Pose 0 stays where it is") {
 
 TEST_CASE("A landmark without an observation does not move") {
   std::mt19937_64 random(3);
-  geoslam_mapper::baseline::Graph graph = random_graph(false, random);
+  eval::baselines::mapper::Graph graph = random_graph(false, random);
   graph.landmarks_m.emplace_back(100.0, 100.0);
   const auto step = gauss_newton_step(graph);
   REQUIRE(step);
@@ -127,7 +127,7 @@ TEST_CASE("A landmark without an observation does not move") {
 }
 
 TEST_CASE("A graph without a determined solution is refused") {
-  geoslam_mapper::baseline::Graph graph;
+  eval::baselines::mapper::Graph graph;
   graph.poses = {Eigen::Vector3d::Zero(), Eigen::Vector3d(1.0, 0.0, 0.0)};
   CHECK_FALSE(gauss_newton_step(graph));
 }

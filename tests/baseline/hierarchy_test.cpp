@@ -6,9 +6,9 @@
 #include <numeric>
 #include <set>
 
-#include "common/hierarchy/baseline/hierarchy.hpp"
-#include "common/hierarchy/baseline/matching.hpp"
-#include "common/hierarchy/baseline/similarity.hpp"
+#include "eval/baselines/hierarchy/hierarchy.hpp"
+#include "eval/baselines/hierarchy/matching.hpp"
+#include "eval/baselines/hierarchy/similarity.hpp"
 #include "tests/baseline/clouds.hpp"
 #include "tests/catch.hpp"
 
@@ -42,7 +42,7 @@ double signed_area(const std::vector<Eigen::Vector2d>& polygon) {
 
 TEST_CASE("A descriptor does not change with rotation and translation") {
   std::mt19937_64 random(1);
-  const hierarchy::baseline::DescriptorMaker describe(0.05);
+  const eval::baselines::hierarchy::DescriptorMaker describe(0.05);
   for (int i = 0; i < 200; ++i) {
     const auto polygon = star_polygon(3 + static_cast<std::size_t>(i % 9), random);
     const geometry::SE2 motion(10.0 * i, -7.0, 0.37 * i);
@@ -51,7 +51,7 @@ TEST_CASE("A descriptor does not change with rotation and translation") {
 }
 
 TEST_CASE("A descriptor does not change with a start moved by whole samples") {
-  const hierarchy::baseline::DescriptorMaker describe(0.05);
+  const eval::baselines::hierarchy::DescriptorMaker describe(0.05);
   // Corners every fifth of the perimeter: each start is a whole number of samples further on.
   const auto corner = [](int i) {
     const double angle = 2.0 * std::numbers::pi * i / 5.0;
@@ -61,14 +61,14 @@ TEST_CASE("A descriptor does not change with a start moved by whole samples") {
   for (int i = 0; i < 5; ++i) {
     pentagon.push_back(corner(i));
   }
-  const hierarchy::baseline::Descriptor first = describe(pentagon);
+  const eval::baselines::hierarchy::Descriptor first = describe(pentagon);
   std::rotate(pentagon.begin(), pentagon.begin() + 2, pentagon.end());
   CHECK((describe(pentagon) - first).norm() < 1e-9);
 }
 
 TEST_CASE("The distance of two descriptors is that over all bins of the DFT") {
   std::mt19937_64 random(2);
-  const hierarchy::baseline::DescriptorMaker describe(0.05);
+  const eval::baselines::hierarchy::DescriptorMaker describe(0.05);
 
   // Regular 20-gons with radii of their own: samples are not the corners, so sample by hand.
   const auto all_bins = [](const std::vector<Eigen::Vector2d>& polygon) {
@@ -109,7 +109,7 @@ TEST_CASE("Polygons are the triangles joined across longest edges") {
   std::mt19937_64 random(3);
   for (int round = 0; round < 20; ++round) {
     const auto cloud = test::random_cloud(80, 80.0, random);
-    const hierarchy::baseline::Hierarchy hierarchy(cloud, 0.05);
+    const eval::baselines::hierarchy::Hierarchy hierarchy(cloud, 0.05);
     const auto triangles = hierarchy.triangles();
     // Oracle: spread labels across longest edges until nothing changes.
     std::vector<std::size_t> label(triangles.size());
@@ -145,7 +145,7 @@ TEST_CASE("Polygons are the triangles joined across longest edges") {
       }
     }
     std::set<std::set<std::uint32_t>> found;
-    for (const hierarchy::baseline::Polygon& polygon : hierarchy.polygons()) {
+    for (const eval::baselines::hierarchy::Polygon& polygon : hierarchy.polygons()) {
       found.emplace(polygon.triangles.begin(), polygon.triangles.end());
     }
     CHECK(found == expected);
@@ -155,7 +155,7 @@ TEST_CASE("Polygons are the triangles joined across longest edges") {
 TEST_CASE("A polygon's boundary encloses exactly its triangles") {
   std::mt19937_64 random(4);
   const auto cloud = test::random_cloud(300, 150.0, random);
-  const hierarchy::baseline::Hierarchy hierarchy(cloud, 0.05);
+  const eval::baselines::hierarchy::Hierarchy hierarchy(cloud, 0.05);
   const auto corners = [&](const auto& vertices) {
     std::vector<Eigen::Vector2d> points;
     for (const std::uint32_t vertex : vertices) {
@@ -164,7 +164,7 @@ TEST_CASE("A polygon's boundary encloses exactly its triangles") {
     return points;
   };
 
-  for (const hierarchy::baseline::Polygon& polygon : hierarchy.polygons()) {
+  for (const eval::baselines::hierarchy::Polygon& polygon : hierarchy.polygons()) {
     CHECK(polygon.vertices.size() == polygon.triangles.size() + 2);
     double area = 0.0;
     for (const std::uint32_t t : polygon.triangles) {
@@ -177,8 +177,8 @@ TEST_CASE("A polygon's boundary encloses exactly its triangles") {
 TEST_CASE("No landmark lies in the circumcircle of a triangle") {
   std::mt19937_64 random(5);
   const auto cloud = test::random_cloud(60, 60.0, random);
-  for (const hierarchy::baseline::DelaunayTriangle& triangle :
-       hierarchy::baseline::delaunay(cloud)) {
+  for (const eval::baselines::hierarchy::DelaunayTriangle& triangle :
+       eval::baselines::hierarchy::delaunay(cloud)) {
     for (const Eigen::Vector2d& point : cloud) {
       Eigen::Matrix3d lifted;
       for (int row = 0; row < 3; ++row) {
@@ -195,17 +195,17 @@ TEST_CASE("Landmarks on one line make an empty hierarchy") {
   for (int i = 0; i < 5; ++i) {
     line.emplace_back(i, 2.0 * i);
   }
-  CHECK(hierarchy::baseline::Hierarchy(line, 0.05).polygons().empty());
-  CHECK(match_hierarchies(hierarchy::baseline::Hierarchy(line, 0.05),
-                          hierarchy::baseline::Hierarchy(line, 0.05), {})
+  CHECK(eval::baselines::hierarchy::Hierarchy(line, 0.05).polygons().empty());
+  CHECK(match_hierarchies(eval::baselines::hierarchy::Hierarchy(line, 0.05),
+                          eval::baselines::hierarchy::Hierarchy(line, 0.05), {})
             .empty());
 }
 
 TEST_CASE("Moved landmarks change edge lengths and leave descriptors") {
   std::mt19937_64 random(6);
   const auto cloud = test::random_cloud(50, 60.0, random);
-  hierarchy::baseline::Hierarchy hierarchy(cloud, 0.05);
-  const hierarchy::baseline::Descriptor descriptor = hierarchy.polygons()[3].descriptor;
+  eval::baselines::hierarchy::Hierarchy hierarchy(cloud, 0.05);
+  const eval::baselines::hierarchy::Descriptor descriptor = hierarchy.polygons()[3].descriptor;
   auto wide = cloud;
   for (Eigen::Vector2d& point : wide) {
     point *= 2.0;

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <set>
 
-#include "common/hierarchy/baseline/matching.hpp"
-#include "common/hierarchy/baseline/similarity.hpp"
+#include "eval/baselines/hierarchy/matching.hpp"
+#include "eval/baselines/hierarchy/similarity.hpp"
 #include "tests/baseline/clouds.hpp"
 #include "tests/catch.hpp"
 
@@ -32,15 +32,15 @@ std::vector<Eigen::Vector2d> noisy_part(const std::vector<Eigen::Vector2d>& clou
 
 /// Polygons that are each other's nearest below tau, by trying all pairs.
 std::set<std::pair<std::uint32_t, std::uint32_t>> mutual_nearest(
-    const hierarchy::baseline::Hierarchy& a, const hierarchy::baseline::Hierarchy& b, double tau,
-    int sides) {
-  const auto nearest = [&](const hierarchy::baseline::Polygon& polygon,
-                           const hierarchy::baseline::Hierarchy& others) {
+    const eval::baselines::hierarchy::Hierarchy& a, const eval::baselines::hierarchy::Hierarchy& b,
+    double tau, int sides) {
+  const auto nearest = [&](const eval::baselines::hierarchy::Polygon& polygon,
+                           const eval::baselines::hierarchy::Hierarchy& others) {
     std::uint32_t best = 0;
     double least = tau;
     bool found = false;
     for (std::uint32_t i = 0; i < others.polygons().size(); ++i) {
-      const hierarchy::baseline::Polygon& other = others.polygons()[i];
+      const eval::baselines::hierarchy::Polygon& other = others.polygons()[i];
       const auto difference =
           static_cast<int>(other.vertices.size()) - static_cast<int>(polygon.vertices.size());
       const double distance = (other.descriptor - polygon.descriptor).norm();
@@ -65,10 +65,10 @@ std::set<std::pair<std::uint32_t, std::uint32_t>> mutual_nearest(
 TEST_CASE("A cloud matches itself, each landmark with itself") {
   std::mt19937_64 random(1);
   const auto cloud = test::random_cloud(60, 70.0, random);
-  const hierarchy::baseline::Hierarchy hierarchy(cloud, 0.05);
+  const eval::baselines::hierarchy::Hierarchy hierarchy(cloud, 0.05);
   const auto pairs = match_hierarchies(hierarchy, hierarchy, {});
   CHECK(pairs.size() == cloud.size());
-  for (const hierarchy::baseline::PointMatch& pair : pairs) {
+  for (const eval::baselines::hierarchy::PointMatch& pair : pairs) {
     CHECK(pair.local == pair.other);
   }
 }
@@ -77,11 +77,11 @@ TEST_CASE("A rotated cloud matches itself") {
   std::mt19937_64 random(2);
   const auto cloud = test::random_cloud(60, 70.0, random);
   const auto rotated = test::moved(cloud, geometry::SE2(30.0, -4.0, 1.9));
-  const auto pairs = match_hierarchies(hierarchy::baseline::Hierarchy(cloud, 0.05),
-                                       hierarchy::baseline::Hierarchy(rotated, 0.05), {});
+  const auto pairs = match_hierarchies(eval::baselines::hierarchy::Hierarchy(cloud, 0.05),
+                                       eval::baselines::hierarchy::Hierarchy(rotated, 0.05), {});
   const auto right = std::count_if(
       pairs.begin(), pairs.end(),
-      [](const hierarchy::baseline::PointMatch& pair) { return pair.local == pair.other; });
+      [](const eval::baselines::hierarchy::PointMatch& pair) { return pair.local == pair.other; });
   CHECK(pairs.size() >= 40);
   CHECK(static_cast<double>(right) >= 0.9 * static_cast<double>(pairs.size()));
 }
@@ -90,10 +90,10 @@ TEST_CASE("The search along the mean radius finds what trying all pairs finds") 
   std::mt19937_64 random(3);
   for (int round = 0; round < 20; ++round) {
     const auto cloud = test::random_cloud(150, 110.0, random);
-    const hierarchy::baseline::Hierarchy a(noisy_part(cloud, 0.9, 0.2, random), 0.05);
-    const hierarchy::baseline::Hierarchy b(noisy_part(cloud, 0.9, 0.2, random), 0.05);
-    const hierarchy::baseline::MatchingParameters parameters{6.0, 3, 0.5};
-    const hierarchy::baseline::HierarchyMatches matches(a, b, parameters);
+    const eval::baselines::hierarchy::Hierarchy a(noisy_part(cloud, 0.9, 0.2, random), 0.05);
+    const eval::baselines::hierarchy::Hierarchy b(noisy_part(cloud, 0.9, 0.2, random), 0.05);
+    const eval::baselines::hierarchy::MatchingParameters parameters{6.0, 3, 0.5};
+    const eval::baselines::hierarchy::HierarchyMatches matches(a, b, parameters);
     std::set<std::pair<std::uint32_t, std::uint32_t>> found;
     for (const auto& [local, other] : matches.polygons()) {
       found.emplace(local, other);
@@ -105,9 +105,9 @@ TEST_CASE("The search along the mean radius finds what trying all pairs finds") 
 TEST_CASE("One search serves every smaller threshold") {
   std::mt19937_64 random(4);
   const auto cloud = test::random_cloud(150, 110.0, random);
-  const hierarchy::baseline::Hierarchy a(noisy_part(cloud, 0.9, 0.1, random), 0.05);
-  const hierarchy::baseline::Hierarchy b(noisy_part(cloud, 0.9, 0.1, random), 0.05);
-  const hierarchy::baseline::HierarchyMatches wide(a, b, {10.0, 3, 0.5});
+  const eval::baselines::hierarchy::Hierarchy a(noisy_part(cloud, 0.9, 0.1, random), 0.05);
+  const eval::baselines::hierarchy::Hierarchy b(noisy_part(cloud, 0.9, 0.1, random), 0.05);
+  const eval::baselines::hierarchy::HierarchyMatches wide(a, b, {10.0, 3, 0.5});
   for (const double tau : {1.0, 2.0, 3.5, 5.0, 10.0}) {
     const auto once = wide.points(tau);
     const auto again = match_hierarchies(a, b, {tau, 3, 0.5});
@@ -134,7 +134,7 @@ TEST_CASE("A similarity is the least-squares solution of the linear problem") {
       b.segment<2>(2 * i) = to[static_cast<std::size_t>(i)];
     }
     const Eigen::Vector4d expected = a.colPivHouseholderQr().solve(b);
-    const auto fit = hierarchy::baseline::fit_similarity(from, to);
+    const auto fit = eval::baselines::hierarchy::fit_similarity(from, to);
     REQUIRE(fit);
     const Eigen::Vector4d found(fit->cosine, fit->sine, fit->translation_m.x(),
                                 fit->translation_m.y());
@@ -144,7 +144,7 @@ TEST_CASE("A similarity is the least-squares solution of the linear problem") {
 
 TEST_CASE("Coinciding points have no similarity") {
   const std::vector<Eigen::Vector2d> same(3, Eigen::Vector2d(1.0, 2.0));
-  CHECK_FALSE(hierarchy::baseline::fit_similarity(same, same));
+  CHECK_FALSE(eval::baselines::hierarchy::fit_similarity(same, same));
 }
 
 }  // namespace

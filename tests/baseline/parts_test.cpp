@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <set>
 
-#include "services/geoslam_mapper/baseline/discovery.hpp"
-#include "services/geoslam_mapper/baseline/pose.hpp"
-#include "services/keyframer/baseline/clusters.hpp"
+#include "eval/baselines/keyframer/clusters.hpp"
+#include "eval/baselines/mapper/discovery.hpp"
+#include "eval/baselines/mapper/pose.hpp"
 #include "tests/baseline/clouds.hpp"
 #include "tests/catch.hpp"
 
@@ -53,7 +53,7 @@ TEST_CASE("Clusters are chains of near points, of the sizes asked for, largest f
   std::mt19937_64 random(1);
   for (int round = 0; round < 30; ++round) {
     const auto cloud = test::random_cloud(150, 18.0, random);
-    const auto clusters = keyframer::baseline::single_linkage(cloud, 1.0, 2, 8);
+    const auto clusters = eval::baselines::keyframer::single_linkage(cloud, 1.0, 2, 8);
     CHECK(std::set<std::vector<std::uint32_t>>(clusters.begin(), clusters.end()) ==
           chained(cloud, 1.0));
     CHECK(std::is_sorted(clusters.begin(), clusters.end(),
@@ -61,8 +61,8 @@ TEST_CASE("Clusters are chains of near points, of the sizes asked for, largest f
   }
 }
 
-geoslam_mapper::baseline::Observation observation(double x, double y) {
-  geoslam_mapper::baseline::Observation s;
+eval::baselines::mapper::Observation observation(double x, double y) {
+  eval::baselines::mapper::Observation s;
   s.in_map_m = {x, y};
   s.in_pose_m = {x - 1.0, y};
   s.observation_count = 8;
@@ -70,8 +70,8 @@ geoslam_mapper::baseline::Observation observation(double x, double y) {
 }
 
 TEST_CASE("The fourth observation near three others makes a landmark, at their mean") {
-  geoslam_mapper::baseline::DiscoveryNetwork network;
-  const geoslam_mapper::baseline::DiscoveryParameters parameters;
+  eval::baselines::mapper::DiscoveryNetwork network;
+  const eval::baselines::mapper::DiscoveryParameters parameters;
   for (std::uint32_t pose = 0; pose < 3; ++pose) {
     CHECK(network.add(pose, {observation(10.0 + 0.1 * pose, 5.0)}, parameters).empty());
     network.slide(parameters);
@@ -84,11 +84,11 @@ TEST_CASE("The fourth observation near three others makes a landmark, at their m
 }
 
 TEST_CASE("Observations older than the window do not count") {
-  geoslam_mapper::baseline::DiscoveryNetwork network;
-  const geoslam_mapper::baseline::DiscoveryParameters parameters;
+  eval::baselines::mapper::DiscoveryNetwork network;
+  const eval::baselines::mapper::DiscoveryParameters parameters;
   for (std::uint32_t pose = 0; pose < 8; ++pose) {
     const bool is_observed = pose % 2 == 0;  // Three within any five poses.
-    std::vector<geoslam_mapper::baseline::Observation> observations;
+    std::vector<eval::baselines::mapper::Observation> observations;
     if (is_observed) {
       observations.push_back(observation(10.0, 5.0));
     }
@@ -99,8 +99,8 @@ TEST_CASE("Observations older than the window do not count") {
 }
 
 TEST_CASE("A chain of observations is no landmark") {
-  geoslam_mapper::baseline::DiscoveryNetwork network;
-  const geoslam_mapper::baseline::DiscoveryParameters parameters;
+  eval::baselines::mapper::DiscoveryNetwork network;
+  const eval::baselines::mapper::DiscoveryParameters parameters;
   for (std::uint32_t pose = 0; pose < 5; ++pose) {
     CHECK(network.add(pose, {observation(10.0 + 0.4 * pose, 5.0)}, parameters).empty());
   }
@@ -116,20 +116,20 @@ TEST_CASE("A pose is found among wrong associations") {
     local.push_back(map_T_base.inverse() * map[i]);
   }
 
-  std::vector<hierarchy::baseline::PointMatch> matches;
+  std::vector<eval::baselines::hierarchy::PointMatch> matches;
 
   for (std::uint32_t i = 0; i < 20; ++i) {
     matches.push_back({i, i % 3 == 0 ? 100 - i : i});
   }
 
   std::mt19937 samples(10);
-  const auto estimate = geoslam_mapper::baseline::estimate_pose(local, map, matches, {}, samples);
+  const auto estimate = eval::baselines::mapper::estimate_pose(local, map, matches, {}, samples);
   REQUIRE(estimate);
   CHECK((map_T_base.inverse() * estimate->map_T_base.pose()).Log().norm() < 1e-6);
   CHECK(estimate->associations.size() == 40);
   CHECK(std::all_of(
       estimate->associations.begin(), estimate->associations.end(),
-      [](const hierarchy::baseline::PointMatch& pair) { return pair.local == pair.other; }));
+      [](const eval::baselines::hierarchy::PointMatch& pair) { return pair.local == pair.other; }));
 }
 
 TEST_CASE("A map landmark that two claim is given to neither") {
@@ -137,9 +137,9 @@ TEST_CASE("A map landmark that two claim is given to neither") {
                                          {5, 17}, {-8, 3}, {20, 3}};
   std::vector<Eigen::Vector2d> local = map;
   local.emplace_back(20.1, 3.0);
-  const std::vector<hierarchy::baseline::PointMatch> matches{{0, 0}, {1, 1}, {2, 2}, {3, 3}};
+  const std::vector<eval::baselines::hierarchy::PointMatch> matches{{0, 0}, {1, 1}, {2, 2}, {3, 3}};
   std::mt19937 samples(10);
-  const auto estimate = geoslam_mapper::baseline::estimate_pose(local, map, matches, {}, samples);
+  const auto estimate = eval::baselines::mapper::estimate_pose(local, map, matches, {}, samples);
   REQUIRE(estimate);
   CHECK(estimate->associations.size() == 6);
   CHECK(estimate->unmatched.size() == 2);
@@ -149,9 +149,9 @@ TEST_CASE("Too few associations give no pose") {
   std::mt19937_64 random(3);
   const auto map = test::random_cloud(50, 60.0, random);
   const std::vector<Eigen::Vector2d> local(map.begin(), map.begin() + 5);
-  const std::vector<hierarchy::baseline::PointMatch> matches{{0, 0}, {1, 1}, {2, 2}};
+  const std::vector<eval::baselines::hierarchy::PointMatch> matches{{0, 0}, {1, 1}, {2, 2}};
   std::mt19937 samples(10);
-  CHECK_FALSE(geoslam_mapper::baseline::estimate_pose(local, map, matches, {}, samples));
+  CHECK_FALSE(eval::baselines::mapper::estimate_pose(local, map, matches, {}, samples));
 }
 
 TEST_CASE("As many associations as a sample has give a pose") {
@@ -160,14 +160,14 @@ TEST_CASE("As many associations as a sample has give a pose") {
   const auto map = test::random_cloud(50, 60.0, random);
   std::vector<Eigen::Vector2d> local;
   for (std::size_t i = 0; i < 12; ++i) local.push_back(map_T_base.inverse() * map[i]);
-  const geoslam_mapper::BaselineMapperParameters parameters;
-  std::vector<hierarchy::baseline::PointMatch> matches;
+  const eval::baselines::mapper::Parameters parameters;
+  std::vector<eval::baselines::hierarchy::PointMatch> matches;
   for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(parameters.pose_sample_size); ++i) {
     matches.push_back({i, i});
   }
   std::mt19937 samples(10);
   const auto estimate =
-      geoslam_mapper::baseline::estimate_pose(local, map, matches, parameters, samples);
+      eval::baselines::mapper::estimate_pose(local, map, matches, parameters, samples);
   REQUIRE(estimate);
   CHECK((map_T_base.inverse() * estimate->map_T_base.pose()).Log().norm() < 1e-6);
 }

@@ -13,7 +13,6 @@
 #include "common/bus/service.hpp"
 #include "common/wire/convert.hpp"
 #include "eval/harness/chain_drive.hpp"
-#include "sim/drive.hpp"
 #include "sim/scenarios.hpp"
 
 namespace understory::test {
@@ -74,21 +73,6 @@ inline Recording record_lidar_drive(double length_m, std::uint64_t seed) {
     for (const auto& message : eval::harness::raw_messages(*reading, sweep_parts))
       chain.feed(message.channel, message.bytes);
   }
-  return chain.take();
-}
-
-/// LANDMARKS of a drive among ideal landmarks; `services` follow it.
-inline Recording record_ideal_drive(const std::vector<bus::Service>& services, double length_m,
-                                    std::uint64_t seed) {
-  sim::DriveParameters parameters;
-  parameters.forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
-  parameters.forest.side_m = 300.0;
-  parameters.path.length_m = length_m;
-  const sim::Drive drive(parameters, seed);
-
-  RecordingChain chain(services, UNDERSTORY_SOURCE_CONFIG);
-  for (std::size_t k = 0; k < drive.size(); ++k)
-    chain.feed("LANDMARKS", wire::encode_message(drive.scan(k).scan));
   return chain.take();
 }
 

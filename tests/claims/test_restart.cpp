@@ -265,14 +265,3 @@ TEST_CASE("every stage of the LIDAR chain goes on after a restart as if there ha
     }
   }
 }
-
-TEST_CASE("the baseline's stages go on after a restart as if there had been none",
-          "[claims][restart]") {
-  const std::string toml = "method = \"baseline\"\n[runtime]\nsnapshot_every_events = 30\n";
-  const std::vector<bus::Service> services = {keyframer::keyframer_service(),
-                                              geoslam_mapper::geoslam_mapper_service()};
-  const Recording recording = record_ideal_drive(services, 40.0, 3);
-  for (const bus::Service& service : services) {
-    DYNAMIC_SECTION(service.name) { check_stopped_and_killed(service, toml, recording); }
-  }
-}

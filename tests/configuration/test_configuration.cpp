@@ -107,11 +107,6 @@ TEST_CASE("a key of an older version is refused with the new one in the message"
       {"geoslam_mapper", "ours.lasting_share", "0.5", "smoothing.correlated_share"},
       // A key of a renamed table that kept its own name.
       {"geoslam_mapper", "ours.gate_sigmas", "3.0", "smoothing.gate_sigmas"},
-      {"geoslam_mapper", "source.descriptor_step", "0.05", "baseline.descriptor_step"},
-      // A choice of a text parameter.
-      {"geoslam_mapper", "method", "\"ours\"", "\"smoothing\""},
-      {"geoslam_mapper", "method", "\"source\"", "\"baseline\""},
-      {"keyframer", "method", "\"source\"", "\"baseline\""},
   };
 
   for (const Renamed& one : all) {
@@ -122,15 +117,30 @@ TEST_CASE("a key of an older version is refused with the new one in the message"
   }
 }
 
+TEST_CASE("a key that was removed is refused with what does its work now", "[configuration]") {
+  for (const std::string service : {"geoslam_mapper", "keyframer"}) {
+    for (const std::string key :
+         {"method", "baseline.descriptor_step", "source.min_associations"}) {
+      CAPTURE(service, key);
+      const std::string problem = problem_of(service_of(service), key, "\"baseline\"");
+      CHECK_THAT(problem, Catch::Matchers::StartsWith("toy.toml:2: " + key + ": was removed: "));
+      CHECK_THAT(problem, Catch::Matchers::EndsWith("runs in understory eval alone"));
+    }
+  }
+}
+
 TEST_CASE("every new name of a renamed key is a key", "[configuration]") {
   for (const bus::Service& service : every_service()) {
     const Described described(service);
     CAPTURE(service.name);
     const auto& entries = described.table.entries();
-    for (const bus::ParameterTable::Renamed& rule : described.table.renames()) {
-      CAPTURE(rule.key, rule.old_name, rule.new_name);
+    for (const bus::ParameterTable::OldKey& rule : described.table.old_keys()) {
+      CAPTURE(rule.name, rule.new_name, rule.why_removed);
+      if (rule.new_name.empty()) {
+        CHECK_FALSE(rule.why_removed.empty());
+        continue;
+      }
       const auto is_there = [&](const bus::ParameterTable::Entry& entry) {
-        if (!rule.key.empty()) return entry.key == rule.key;
         return rule.new_name.ends_with('.') ? entry.key.starts_with(rule.new_name)
                                             : entry.key == rule.new_name;
       };

@@ -12,37 +12,34 @@ using namespace understory::eval;
 
 namespace {
 
-/// A keyframe from every eight scans, without landmarks; some can be withheld.
-class EveryEighth : public keyframer::KeyframerMethod {
+/// A keyframe from every eight scans, without landmarks; one can be withheld.
+class EveryEighth {
  public:
-  explicit EveryEighth(std::uint64_t withheld = ~0ULL) : withheld_(withheld) {}
-  std::optional<model::Keyframe> add(const model::LandmarkScan& scan) override {
+  explicit EveryEighth(std::uint64_t withheld) : withheld_(withheld) {}
+  std::optional<model::Keyframe> add(const model::LandmarkScan& scan) {
     members_.push_back({scan.utime, scan.sequence, {}, Eigen::Matrix3d::Zero()});
     if (members_.size() < 8) return std::nullopt;
     model::Keyframe keyframe;
     keyframe.sequence = next_++;
     keyframe.members = std::exchange(members_, {});
     if (keyframe.sequence == withheld_) {
-      ++counters_.keyframes_withheld;
+      ++count_withheld_;
       return std::nullopt;
     }
     return keyframe;
   }
-  void add(const model::Odometry&) override {}
-  const keyframer::KeyframerCounters& counters() const override { return counters_; }
-  std::string save() const override { return {}; }
-  void load(const std::string&) override {}
+  std::uint64_t count_withheld() const { return count_withheld_; }
 
  private:
   std::uint64_t withheld_;
   std::uint64_t next_ = 0;
+  std::uint64_t count_withheld_ = 0;
   std::vector<model::KeyframeMember> members_;
-  keyframer::KeyframerCounters counters_;
 };
 
 /// Knows the truth and adds an offset to all poses but the first; can hold back its first keyframes
 /// and refuse one.
-class Displacing : public geoslam_mapper::MapperMethod {
+class Displacing {
  public:
   struct Behaviour {
     double offset_m = 0.0;
@@ -52,7 +49,7 @@ class Displacing : public geoslam_mapper::MapperMethod {
   Displacing(const eval::metrics::MapTruth& truth, const Behaviour& behaviour)
       : truth_(truth), behaviour_(behaviour) {}
 
-  model::MapUpdate add(const model::Keyframe& keyframe) override {
+  model::MapUpdate add(const model::Keyframe& keyframe) {
     model::MapUpdate update;
     update.keyframe_sequence = keyframe.sequence;
     update.status = model::MapUpdateStatus::kNotSure;
@@ -75,17 +72,13 @@ class Displacing : public geoslam_mapper::MapperMethod {
     buffered_.clear();
     return update;
   }
-  void add(const model::Odometry&) override {}
-  void start_with(std::span<const model::MapLandmark>) override {}
-  std::vector<model::KeyframePose> trajectory() const override { return poses_; }
-  std::vector<model::MapLandmark> landmarks() const override {
+  std::vector<model::KeyframePose> trajectory() const { return poses_; }
+  std::vector<model::MapLandmark> landmarks() const {
     model::MapLandmark landmark;
     landmark.id = 1;
     landmark.position_m = truth_.trunk_m(truth_.trunks_in_range()[0]) + Eigen::Vector2d(0.2, 0.0);
     return {landmark};
   }
-  std::string save() const override { return {}; }
-  void load(const std::string&) override {}
 
  private:
   const eval::metrics::MapTruth& truth_;
@@ -94,16 +87,25 @@ class Displacing : public geoslam_mapper::MapperMethod {
   std::vector<model::KeyframePose> poses_;
 };
 
+eval::harness::Stages stages_of(const eval::metrics::MapTruth& truth,
+                                const Displacing::Behaviour& behaviour, std::uint64_t withheld) {
+  const auto keyframer = std::make_shared<EveryEighth>(withheld);
+  const auto mapper = std::make_shared<Displacing>(truth, behaviour);
+  return {
+      {[=](const model::LandmarkScan& scan) { return keyframer->add(scan); },
+       [] { return std::vector<model::Keyframe>(); }, [=] { return keyframer->count_withheld(); }},
+      {[=](const model::Keyframe& keyframe) { return mapper->add(keyframe); },
+       [=] { return mapper->trajectory(); }, [=] { return mapper->landmarks(); },
+       [](eval::harness::SubmapShelf&) {}}};
+}
+
 eval::harness::RunResult run_with(const Displacing::Behaviour& behaviour,
                                   std::uint64_t withheld = ~0ULL) {
   static const eval::harness::RecordedDrive recorded(test::small_drive_parameters(),
                                                      1);  // 40 scans: five keyframes
   const eval::metrics::MapTruth truth(recorded.drive, 0);
   const std::atomic<bool> stop{false};
-  return run_slam(
-      recorded,
-      {std::make_unique<EveryEighth>(withheld), std::make_unique<Displacing>(truth, behaviour)},
-      stop);
+  return run_slam(recorded, stages_of(truth, behaviour, withheld), stop);
 }
 
 }  // namespace
@@ -152,9 +154,5 @@ TEST_CASE("A run can be stopped", "[run]") {
   const eval::harness::RecordedDrive recorded(test::small_drive_parameters(), 1);
   const eval::metrics::MapTruth truth(recorded.drive, 0);
   const std::atomic<bool> stop{true};
-  CHECK_THROWS_AS(run_slam(recorded,
-                           {std::make_unique<EveryEighth>(),
-                            std::make_unique<Displacing>(truth, Displacing::Behaviour{})},
-                           stop),
-                  terminal::Interrupted);
+  CHECK_THROWS_AS(run_slam(recorded, stages_of(truth, {}, ~0ULL), stop), terminal::Interrupted);
 }

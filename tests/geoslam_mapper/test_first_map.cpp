@@ -50,7 +50,7 @@ bool is_placed_in(const model::MapUpdate& update, std::uint32_t map_id) {
 }
 
 /// Distances of the map's landmarks to the nearest trunk, by the pose of the first keyframe.
-std::vector<double> landmark_errors_m(const MapperMethod& mapper, const sim::Drive& drive) {
+std::vector<double> landmark_errors_m(const SmoothingMapper& mapper, const sim::Drive& drive) {
   const model::KeyframePose first = mapper.trajectory().front();
   const geometry::SE2 world_T_map =
       drive.world_T_vehicle()[kScansPerKeyframe * first.keyframe_sequence] *
@@ -104,7 +104,7 @@ TEST_CASE("What is wrong in the first keyframe, and in view of the next ones, do
     for (const model::Keyframe& keyframe : keyframes) {
       const model::MapUpdate update = mapper.add(keyframe);
       if (update.status == model::MapUpdateStatus::kFirstMap) held.clear();
-      held = with_delta(held, map_change(held, *mapper.take_changed_landmarks(), update, {}));
+      held = with_delta(held, map_change(held, mapper.take_changed_landmarks(), update, {}));
     }
     REQUIRE(held.size() == mapper.landmarks().size());
     const std::vector<double> errors_m = landmark_errors_m(mapper, drive);

@@ -46,7 +46,10 @@ struct ChangedMap {
       const auto fate = random() % 6;
       model::MapLandmark one = landmark(id, random);
       if (fate != 0) before.push_back(one);
-      if (fate == 1) continue;
+      if (fate == 1) {
+        update.removed.push_back(id);
+        continue;
+      }
       if (fate == 2 && !after.empty()) {
         update.merged.emplace_back(id, after.back().id);
         continue;
@@ -105,7 +108,7 @@ TEST_CASE("a holder of every difference has the map", "[map_publishing]") {
   std::mt19937_64 random(1);
   for (int run = 0; run < 200; ++run) {
     const ChangedMap map(random, kMoved);
-    const model::MapDelta delta = map_difference(map.before, map.after, map.update, {kMoved, {}});
+    const model::MapDelta delta = map_change(map.before, map.after, map.update, {kMoved, {}});
     const auto held = with_delta(map.before, delta);
     REQUIRE(held.size() == map.after.size());
     for (std::size_t i = 0; i < held.size(); ++i) {
@@ -120,7 +123,7 @@ TEST_CASE("a difference holds no more than what changed", "[map_publishing]") {
   std::mt19937_64 random(2);
   for (int run = 0; run < 200; ++run) {
     const ChangedMap map(random, kMoved);
-    const model::MapDelta delta = map_difference(map.before, map.after, map.update, {kMoved, {}});
+    const model::MapDelta delta = map_change(map.before, map.after, map.update, {kMoved, {}});
     const auto before = ids_of(map.before);
     const auto after = ids_of(map.after);
     for (const auto& one : delta.added) CHECK_FALSE(before.contains(one.id));
@@ -130,7 +133,7 @@ TEST_CASE("a difference holds no more than what changed", "[map_publishing]") {
       CHECK_FALSE(after.contains(id));
       for (const auto& [old_id, new_id] : delta.merged) CHECK(old_id != id);
     }
-    const auto nothing = map_difference(map.after, map.after, {}, {kMoved, {}});
+    const auto nothing = map_change(map.after, map.after, {}, {kMoved, {}});
     CHECK(nothing.added.empty());
     CHECK(nothing.moved.empty());
     CHECK(nothing.removed.empty());
@@ -144,7 +147,7 @@ TEST_CASE("small steps add up until they are reported", "[map_publishing]") {
   int reported = 0;
   for (int step = 0; step < 100; ++step) {
     map[0].position_m.x() += 0.004;
-    const model::MapDelta delta = map_difference(held, map, {}, {0.01, {}});
+    const model::MapDelta delta = map_change(held, map, {}, {0.01, {}});
     reported += static_cast<int>(delta.moved.size());
     held = with_delta(held, delta);
     CHECK((held[0].position_m - map[0].position_m).norm() <= 0.01);

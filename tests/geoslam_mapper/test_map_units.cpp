@@ -67,8 +67,8 @@ class ShortSighted {
   void hold(const model::MapUpdate& update) {
     for (const auto& [old_id, new_id] : update.merged) held_.erase(old_id);
     for (const model::LandmarkId id : update.removed) held_.erase(id);
-    if (const auto changed = mapper_.take_changed_landmarks())
-      for (const model::MapLandmark& one : *changed) held_[one.id] = one.position_m;
+    for (const model::MapLandmark& one : mapper_.take_changed_landmarks())
+      held_[one.id] = one.position_m;
   }
 
   std::mt19937_64 random_;

@@ -19,36 +19,7 @@ model::MapLandmark landmark(model::LandmarkId number, double x_m, std::uint32_t 
   return one;
 }
 
-/// A mapper of which the test says what it has.
-class FakeMapper : public MapperMethod {
- public:
-  model::MapUpdate add(const model::Keyframe& /*keyframe*/) override { return {}; }
-  void add(const model::Odometry& /*odometry*/) override {}
-  void start_with(std::span<const model::MapLandmark> given) override {
-    held.assign(given.begin(), given.end());
-  }
-  std::vector<model::KeyframePose> trajectory() const override { return path; }
-  std::vector<model::MapLandmark> landmarks() const override { return held; }
-  void may_hand_over(bool may) override { may_give = may; }
-  std::vector<model::Submap> take_given_away() override { return std::exchange(given_away, {}); }
-  std::vector<model::SubmapId> wanted() const override { return wants; }
-  std::string bring_back(const model::Submap& submap) override {
-    if (!refusal.empty()) return refusal;
-    std::erase(wants, submap.id);
-    return {};
-  }
-  std::vector<model::SubmapPose> submap_poses() const override { return places; }
-  std::string save() const override { return {}; }
-  void load(const std::string& /*state*/) override {}
-
-  std::vector<model::MapLandmark> held;
-  std::vector<model::KeyframePose> path;
-  std::vector<model::Submap> given_away;
-  std::vector<model::SubmapId> wants;
-  std::vector<model::SubmapPose> places;
-  std::string refusal;
-  bool may_give = false;
-};
+using Landmarks = std::vector<model::MapLandmark>;
 
 model::MapUpdate updated(std::uint32_t map_id = 1, model::Utime utime = 1'000'000) {
   model::MapUpdate update;
@@ -59,6 +30,15 @@ model::MapUpdate updated(std::uint32_t map_id = 1, model::Utime utime = 1'000'00
 }
 
 PublishedMap published() { return PublishedMap({0.001, 0.5, 0.1}); }
+
+/// The map learns of an update; each landmark has 0.01 m^2 along each axis.
+std::optional<model::MapDelta> tell(PublishedMap& map, const model::MapUpdate& update,
+                                    const Landmarks& changed) {
+  return map.on_update(update, changed, [](std::span<model::MapLandmark> landmarks) {
+    for (model::MapLandmark& one : landmarks)
+      one.covariance_m2 = 0.01 * Eigen::Matrix2d::Identity();
+  });
+}
 
 model::Submap submap(model::SubmapId id, std::vector<model::MapLandmark> landmarks) {
   model::Submap one;
@@ -91,13 +71,13 @@ ScanPose place_at(double x_m) {
 }  // namespace
 
 TEST_CASE("a published map numbers its versions and tells changes alone", "[published]") {
-  FakeMapper mapper;
+  Landmarks held;
   PublishedMap map = published();
   CHECK(map.map_id() == 0);
   CHECK_FALSE(map.has_changed());
 
-  mapper.held = {landmark(1, 0.0), landmark(2, 5.0)};
-  const auto first = map.on_update(updated(), mapper);
+  held = {landmark(1, 0.0), landmark(2, 5.0)};
+  const auto first = tell(map, updated(), held);
   REQUIRE(first);
   CHECK(first->base_version == 0);
   CHECK(first->version == 1);
@@ -106,28 +86,29 @@ TEST_CASE("a published map numbers its versions and tells changes alone", "[publ
   map.sent(100);
   CHECK_FALSE(map.has_changed());
 
-  CHECK_FALSE(map.on_update(updated(), mapper));
+  CHECK_FALSE(tell(map, updated(), held));
   CHECK(map.has_changed());  // By less than is told.
-  mapper.held.push_back(landmark(3, 9.0));
-  const auto second = map.on_update(updated(), mapper);
+  held.push_back(landmark(3, 9.0));
+  const auto second = tell(map, updated(), held);
   REQUIRE(second);
   CHECK(second->base_version == 1);
   CHECK(second->version == 2);
   CHECK(second->added.size() == 1);
-  CHECK(map.whole(mapper).version == 2);
-  CHECK(map.whole(mapper).landmarks.size() == 3);
+  CHECK(second->added.front().covariance_m2(0, 0) == Approx(0.01));
+  CHECK(map.whole(held, {}).version == 2);
+  CHECK(map.whole(held, {}).landmarks.size() == 3);
 }
 
 TEST_CASE("MAP without a request stays within its share, but for one that is due", "[published]") {
-  FakeMapper mapper;
+  Landmarks held;
   PublishedMap map = published();
-  mapper.held = {landmark(1, 0.0)};
-  map.on_update(updated(), mapper);
+  held = {landmark(1, 0.0)};
+  tell(map, updated(), held);
   CHECK(map.is_due());
   const std::size_t bytes = map_bytes(1, 1);
   map.sent(bytes);  // Borrowed.
 
-  map.on_update(updated(), mapper);
+  tell(map, updated(), held);
   CHECK_FALSE(map.is_due());
   map.earn(9 * bytes);  // Pays what was borrowed.
   CHECK_FALSE(map.is_due());
@@ -136,21 +117,21 @@ TEST_CASE("MAP without a request stays within its share, but for one that is due
 
   // A jump of most of the map is due while nothing is owed.
   map.sent(map_bytes(1, 2));
-  mapper.held.front().position_m.x() += 1.0;
-  map.on_update(updated(), mapper);
+  held.front().position_m.x() += 1.0;
+  tell(map, updated(), held);
   CHECK(map.is_due());
 }
 
 TEST_CASE("another map builds on nothing, and versions go on", "[published]") {
-  FakeMapper mapper;
+  Landmarks held;
   PublishedMap map = published();
-  mapper.held = {landmark(1, 0.0)};
-  map.on_update(updated(1), mapper);
+  held = {landmark(1, 0.0)};
+  tell(map, updated(1), held);
   CHECK_FALSE(map.is_another(updated(1)));
   CHECK(map.is_another(updated(2)));
 
-  mapper.held = {landmark(1, 3.0, 2)};
-  const auto delta = map.on_update(updated(2), mapper);
+  held = {landmark(1, 3.0, 2)};
+  const auto delta = tell(map, updated(2), held);
   REQUIRE(delta);
   CHECK(map.map_id() == 2);
   CHECK(delta->base_version == 0);
@@ -160,26 +141,26 @@ TEST_CASE("another map builds on nothing, and versions go on", "[published]") {
 }
 
 TEST_CASE("a given map is due at once and has the number of its landmarks", "[published]") {
-  FakeMapper mapper;
+  Landmarks held;
   PublishedMap map = published();
   map.begin_with({landmark(4, 0.0, 9)});
   CHECK(map.map_id() == 9);
   CHECK(map.is_due());
-  mapper.held = {landmark(4, 0.0, 9)};
-  CHECK_FALSE(map.on_update(updated(9), mapper));
+  held = {landmark(4, 0.0, 9)};
+  CHECK_FALSE(tell(map, updated(9), held));
 }
 
 TEST_CASE("a published map goes on after a restart as it would have", "[published]") {
-  FakeMapper mapper;
+  Landmarks held;
   PublishedMap map = published();
-  mapper.held = {landmark(1, 0.0), landmark(2, 5.0)};
-  map.on_update(updated(), mapper);
+  held = {landmark(1, 0.0), landmark(2, 5.0)};
+  tell(map, updated(), held);
   map.sent(1000);
   map.earn(500);
   PublishedMap loaded = published();
   state::load(state::save({"test"}, map), {"test"}, loaded);
-  mapper.held.push_back(landmark(3, 9.0));
-  const auto a = map.on_update(updated(), mapper), b = loaded.on_update(updated(), mapper);
+  held.push_back(landmark(3, 9.0));
+  const auto a = tell(map, updated(), held), b = tell(loaded, updated(), held);
   REQUIRE((a && b));
   CHECK(a->version == b->version);
   CHECK(map.is_due() == loaded.is_due());
@@ -193,28 +174,25 @@ TEST_CASE("poses are published once, in order of time, and counted once", "[publ
   CHECK_FALSE(poses.on_scan(scan_at(200), std::nullopt, 1));
 
   // The scan at 100 has its pose; all three count now.
-  auto made = poses.on_keyframe(keyframe_of({100, 200, 300}), updated(), false, false);
+  auto made = poses.on_keyframe(keyframe_of({100, 200, 300}), updated(), false);
   CHECK(made.counted == 3);
   REQUIRE(made.poses.size() == 2);
   CHECK(made.poses.front().utime == 200);
   // Keyframes may share scans.
-  made = poses.on_keyframe(keyframe_of({300, 400}), updated(), true, false);
+  made = poses.on_keyframe(keyframe_of({300, 400}), updated(), true);
   CHECK(made.counted == 1);
   REQUIRE(made.poses.size() == 1);
   CHECK(made.poses.front().is_new_map);
 }
 
-TEST_CASE("where scans are located as they come, a keyframe's old ones have no pose",
-          "[published]") {
+TEST_CASE("a keyframe's old scans have no pose", "[published]") {
   constexpr model::Utime kSecond = 1'000'000;
-  for (const bool locates : {false, true}) {
-    PoseStream poses = stream();
-    CHECK_FALSE(poses.on_scan(scan_at(5 * kSecond), std::nullopt, 0));
-    const auto made =
-        poses.on_keyframe(keyframe_of({kSecond, 5 * kSecond - 10}), updated(), false, locates);
-    CHECK(made.poses.size() == (locates ? 1 : 2));
-    CHECK(made.counted == 2);
-  }
+  PoseStream poses = stream();
+  CHECK_FALSE(poses.on_scan(scan_at(5 * kSecond), std::nullopt, 0));
+  const auto made = poses.on_keyframe(keyframe_of({kSecond, 5 * kSecond - 10}), updated(), false);
+  REQUIRE(made.poses.size() == 1);
+  CHECK(made.poses.front().utime == 5 * kSecond - 10);
+  CHECK(made.counted == 2);
 }
 
 TEST_CASE("a pose has the odometry's frame, the jumps so far and the given map's error",
@@ -241,73 +219,64 @@ TEST_CASE("a pose has the odometry's frame, the jumps so far and the given map's
   CHECK(poses.given_covariance_at({}, 2).isZero(0.0));
 }
 
+TEST_CASE("landmarks of a submap that went are told to nobody", "[published]") {
+  Landmarks held{landmark(1, 0.0), landmark(2, 5.0)};
+  PublishedMap map = published();
+  tell(map, updated(), held);
+  map.give_away(submap(1, {held.back()}));
+  held.pop_back();
+  CHECK(map.landmarks().size() == 1);
+  CHECK_FALSE(tell(map, updated(), held));  // Nor by the next keyframe.
+}
+
 TEST_CASE("a submap is sent again until the store has it, and stops the mapper where none does",
           "[published]") {
-  FakeMapper mapper;
-  PublishedMap map = published();
-  mapper.held = {landmark(1, 0.0), landmark(2, 5.0)};
-  map.on_update(updated(), mapper);
   SubmapExchange exchange;
-  mapper.given_away = {submap(1, {landmark(2, 5.0)})};
-  mapper.held.pop_back();
+  CHECK(exchange.on_keyframe(0, {submap(1, {})}, {}, 1).submaps.size() == 1);
+  CHECK(exchange.on_keyframe(500'000, {}, {}, 1).submaps.empty());
+  CHECK(exchange.on_keyframe(1'000'000, {}, {}, 1).submaps.size() == 1);
+  exchange.on_stored({0, 0, 1, 1, 7});
+  CHECK(exchange.on_keyframe(2'000'000, {}, {}, 1).submaps.empty());
+  CHECK(exchange.keeps_up());
 
-  CHECK(exchange.on_keyframe(0, mapper, map).submaps.size() == 1);
-  CHECK(map.landmarks().size() == 1);             // Nobody is told that it went.
-  CHECK_FALSE(map.on_update(updated(), mapper));  // Nor by the next keyframe.
-  CHECK(exchange.on_keyframe(500'000, mapper, map).submaps.empty());
-  CHECK(exchange.on_keyframe(1'000'000, mapper, map).submaps.size() == 1);
-  exchange.on_stored({0, 0, 1, 1, 7}, mapper);
-  CHECK(exchange.on_keyframe(2'000'000, mapper, map).submaps.empty());
-  CHECK(mapper.may_give);
-
+  std::vector<model::Submap> given_away;
   for (model::SubmapId id = 2; id < 2 + HandOver::kMostWaiting; ++id)
-    mapper.given_away.push_back(submap(id, {}));
-  exchange.on_keyframe(3'000'000, mapper, map);
+    given_away.push_back(submap(id, {}));
+  exchange.on_keyframe(3'000'000, given_away, {}, 1);
   CHECK_FALSE(exchange.keeps_up());
-  CHECK_FALSE(mapper.may_give);
-  exchange.on_stored({0, 0, 1, 2, 14}, mapper);
-  CHECK(mapper.may_give);
+  exchange.on_stored({0, 0, 1, 2, 14});
+  CHECK(exchange.keeps_up());
 }
 
 TEST_CASE("a wanted submap comes from what waits, else the store is asked", "[published]") {
-  FakeMapper mapper;
-  PublishedMap map = published();
-  map.on_update(updated(), mapper);
   SubmapExchange exchange;
-  mapper.given_away = {submap(1, {})};
-  exchange.on_keyframe(0, mapper, map);
-  mapper.wants = {1, 8};
+  exchange.on_keyframe(0, {submap(1, {})}, {}, 1);
 
-  const auto messages = exchange.on_keyframe(100'000, mapper, map);
-  CHECK(messages.refused.empty());
+  const auto messages = exchange.on_keyframe(100'000, {}, {1, 8}, 1);
+  REQUIRE(messages.waited.size() == 1);
+  CHECK(messages.waited.front().id == 1);
   CHECK(messages.query.ids == std::vector<model::SubmapId>{8});
-  CHECK(mapper.wants == std::vector<model::SubmapId>{8});
-  CHECK(exchange.on_keyframe(2'000'000, mapper, map).submaps.empty());  // It is back.
-
-  CHECK(exchange.on_reply(submap(3, {}), mapper, map).empty());  // Not wanted: passed over.
-  mapper.refusal = "is not as it was";
-  CHECK(exchange.on_reply(submap(8, {}), mapper, map) == "is not as it was");
-  mapper.refusal.clear();
-  CHECK(exchange.on_reply(submap(8, {}), mapper, map).empty());
-  CHECK(mapper.wants.empty());
+  const auto next = exchange.on_keyframe(2'000'000, {}, {8}, 1);
+  CHECK(next.submaps.empty());  // It does not wait any more.
+  CHECK(next.waited.empty());
 }
 
 TEST_CASE("poses of submaps are sent where one moved, every ten seconds and at the end",
           "[published]") {
-  FakeMapper mapper;
   PublishedMap map = published();
-  map.on_update(updated(), mapper);
+  tell(map, updated(), {});
   SubmapExchange exchange;
-  mapper.places = {{4, geometry::SE2(1.0, 0.0, 0.0)}};
-  CHECK_FALSE(exchange.correction(mapper, map, 9'000'000, false));
-  const auto first = exchange.correction(mapper, map, 10'000'000, false);
+  std::vector<model::SubmapPose> places{{4, geometry::SE2(1.0, 0.0, 0.0)}};
+  CHECK_FALSE(exchange.is_correction_due(9'000'000));
+  REQUIRE(exchange.is_correction_due(10'000'000));
+  const auto first = exchange.correction(places, map, false);
   REQUIRE(first);
   CHECK(first->version == 1);
   CHECK(first->submaps.size() == 1);
 
-  mapper.places.front().map_T_submap = geometry::SE2(1.01, 0.0, 0.0);  // Less than matters.
-  CHECK_FALSE(exchange.correction(mapper, map, 30'000'000, false));
-  const auto last = exchange.correction(mapper, map, 30'000'001, true);
+  places.front().map_T_submap = geometry::SE2(1.01, 0.0, 0.0);  // Less than matters.
+  CHECK_FALSE(exchange.correction(places, map, false));
+  const auto last = exchange.correction(places, map, true);
   REQUIRE(last);
   CHECK(last->version == 2);
 }

@@ -99,7 +99,7 @@ TEST_CASE("Covariances of some landmarks are those of the whole map", "[mapper][
     if (!keyframe) continue;
     mapper.add(*keyframe);
     const std::vector<model::MapLandmark> whole = mapper.landmarks();
-    std::vector<model::MapLandmark> changed = *mapper.take_changed_landmarks();
+    std::vector<model::MapLandmark> changed = mapper.take_changed_landmarks();
     mapper.set_covariances(changed);
     for (const model::MapLandmark& one : changed) {
       const auto same = std::ranges::find(whole, one.id, &model::MapLandmark::id);

@@ -1,16 +1,16 @@
 // A keyframer that was stopped and started again gives the same bytes as one that ran through.
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "common/model/archive.hpp"
-#include "services/keyframer/keyframer.hpp"
+#include "services/keyframer/joint/joint_keyframer.hpp"
 #include "sim/inertial_drive.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
 using namespace understory::keyframer;
+using joint::JointKeyframer;
 
 namespace {
 
@@ -44,72 +44,65 @@ model::EkfLevel level(const sim::DriveStep& step) {
 }
 
 /// The outputs of a drive, each as bytes; the keyframer is stopped before the scan `restart`.
-std::vector<std::string> outputs(const KeyframerParameters& parameters, sim::OdometryKind odometry,
-                                 std::uint64_t seed, std::optional<int> restart) {
+std::vector<std::string> outputs(const JointKeyframerParameters& parameters,
+                                 sim::OdometryKind odometry, std::uint64_t seed,
+                                 std::optional<int> restart) {
   sim::InertialDrive drive(noisy_drive(odometry), trunks(), seed);
-  std::unique_ptr<KeyframerMethod> stage = make_keyframer(parameters);
+  JointKeyframer stage(parameters);
   std::vector<std::string> bytes;
   for (int k = 0; k < 60; ++k) {
     if (restart == k) {
-      const std::string saved = stage->save();
-      stage = make_keyframer(parameters);
-      stage->load(saved);
-      REQUIRE(stage->save() == saved);
+      const std::string saved = stage.save();
+      stage = JointKeyframer(parameters);
+      stage.load(saved);
+      REQUIRE(stage.save() == saved);
     }
     sim::DriveStep step = drive.next();
     for (model::Detection& detection : step.scan.detections) detection.position_m.z() = 1.3;
-    for (const model::Odometry& increment : step.odometry) stage->add(increment);
-    const auto keyframe = stage->add(step.scan);
-    bytes.push_back(state::save({"output", 2}, stage->take_waited(), keyframe));
-    stage->add(level(step));
+    for (const model::Odometry& increment : step.odometry) stage.add(increment);
+    const auto keyframe = stage.add(step.scan);
+    bytes.push_back(state::save({"output", 2}, stage.take_waited(), keyframe));
+    stage.add(level(step));
   }
-  bytes.push_back(stage->save());
+  bytes.push_back(stage.save());
   return bytes;
 }
 
 }  // namespace
 
 TEST_CASE("A restarted keyframer continues as if it had not stopped", "[keyframer][state]") {
-  KeyframerParameters parameters;
-  parameters.method = GENERATE("joint", "baseline");
+  const JointKeyframerParameters parameters;
   const auto odometry = GENERATE(sim::OdometryKind::kInertialAndWheels, sim::OdometryKind::kNone);
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const auto expected = outputs(parameters, odometry, seed, std::nullopt);
     // In the middle of a keyframe, and between two.
     for (const int restart : {0, 1, 29, 32, 47}) {
-      CAPTURE(parameters.method, static_cast<int>(odometry), seed, restart);
+      CAPTURE(static_cast<int>(odometry), seed, restart);
       REQUIRE(outputs(parameters, odometry, seed, restart) == expected);
     }
   }
 }
 
 TEST_CASE("A keyframer is restarted while its first keyframes wait", "[keyframer][state]") {
-  KeyframerParameters parameters;
-  parameters.joint.observations_per_keyframe = 1;
-  parameters.joint.min_observations = 1;
+  JointKeyframerParameters parameters;
+  parameters.observations_per_keyframe = 1;
+  parameters.min_observations = 1;
   const auto expected = outputs(parameters, sim::OdometryKind::kNone, 1, std::nullopt);
   for (const int restart : {0, 1, 2, 3, 4, 5})
     REQUIRE(outputs(parameters, sim::OdometryKind::kNone, 1, restart) == expected);
 }
 
 TEST_CASE("Bytes of another stage are refused, and the state stays", "[keyframer][state]") {
-  KeyframerParameters parameters;
-  parameters.method = GENERATE("joint", "baseline");
-  const auto stage = make_keyframer(parameters);
+  JointKeyframer stage{JointKeyframerParameters{}};
   sim::InertialDrive drive(noisy_drive(sim::OdometryKind::kNone), trunks(), 3);
-  for (int k = 0; k < 12; ++k) stage->add(drive.next().scan);
-  const std::string before = stage->save();
+  for (int k = 0; k < 12; ++k) stage.add(drive.next().scan);
+  const std::string before = stage.save();
 
-  REQUIRE_THROWS_AS(stage->load("no state"), std::invalid_argument);
-  REQUIRE_THROWS_AS(stage->load(before.substr(0, before.size() - 1)), std::invalid_argument);
-  REQUIRE_THROWS_AS(stage->load(before + "x"), std::invalid_argument);
-  parameters.method = parameters.method == "joint" ? "baseline" : "joint";
-  REQUIRE_THROWS_AS(stage->load(make_keyframer(parameters)->save()), std::invalid_argument);
-  REQUIRE(stage->save() == before);
-}
-
-TEST_CASE("An unknown method is refused", "[keyframer]") {
-  KeyframerParameters parameters;
-  parameters.method = "source";
-  REQUIRE_THROWS_AS(make_keyframer(parameters), std::invalid_argument);
+  REQUIRE_THROWS_AS(stage.load("no state"), std::invalid_argument);
+  REQUIRE_THROWS_AS(stage.load(before.substr(0, before.size() - 1)), std::invalid_argument);
+  REQUIRE_THROWS_AS(stage.load(before + "x"), std::invalid_argument);
+  // The thesis's method was another one of this stage.
+  REQUIRE_THROWS_AS(stage.load(state::save({"keyframer.baseline", 2}, before)),
+                    std::invalid_argument);
+  REQUIRE(stage.save() == before);
 }

@@ -113,7 +113,7 @@ std::vector<PlaceQuestion> questions_of(const Setting& setting, const std::strin
   for (std::size_t k = 0; k < drive.size(); ++k) {
     std::optional<model::Keyframe> keyframe;
     if (!setting.single_scans) {
-      keyframe = keyframer->add(drive.scan(k).scan);
+      keyframe = keyframer.add(drive.scan(k).scan);
     } else if (k % kScansPerKeyframe == 0) {
       keyframe = keyframe_of(drive.scan(k).scan);
     }

@@ -1,14 +1,10 @@
 #include "eval/experiments/large_map/large_map_methods.hpp"
 
 #include <cmath>
-#include <random>
 #include <stdexcept>
 
 #include "common/constellation/map.hpp"
-#include "common/hierarchy/baseline/hierarchy.hpp"
-#include "common/hierarchy/baseline/matching.hpp"
-#include "services/geoslam_mapper/baseline/pose.hpp"
-#include "services/geoslam_mapper/parameters.hpp"
+#include "eval/baselines/mapper/pose.hpp"
 
 namespace understory::eval::experiments::large_map {
 namespace {
@@ -48,40 +44,16 @@ class BaselineFinder final : public PlaceFinder {
     for (const model::KeyframeLandmark& landmark : keyframe.landmarks) {
       local.push_back(landmark.position_m);
     }
-    const std::vector<hierarchy::baseline::PointMatch> pairs = match(local);
-    if (pairs.size() < static_cast<std::size_t>(parameters_.min_associations)) {
-      return {std::nullopt, "too few associations of polygons"};
-    }
-    std::mt19937 random(10);  // the published code's seed, for every keyframe
-    const auto estimate =
-        geoslam_mapper::baseline::estimate_pose(local, landmarks_m_, pairs, parameters_, random);
-    if (!estimate) return {std::nullopt, "no pose with enough associations"};
-    const Eigen::Vector3d pose = estimate->map_T_base.pose().coordinates();
+    const auto found = baselines::mapper::localise(local, landmarks_m_, hierarchy_, parameters_);
+    if (!found.estimate) return {std::nullopt, found.reason};
+    const Eigen::Vector3d pose = found.estimate->map_T_base.pose().coordinates();
     return {geometry::SE2(pose.x(), pose.y(), pose.z()) * keyframe.centre_T_base(), {}};
   }
 
  private:
-  /// Algorithm 3, lines 5-7.
-  std::vector<hierarchy::baseline::PointMatch> match(std::span<const Eigen::Vector2d> local) const {
-    const hierarchy::baseline::Hierarchy hierarchy(local, parameters_.descriptor_step);
-    const hierarchy::baseline::HierarchyMatches matches(
-        hierarchy, hierarchy_,
-        {parameters_.max_descriptor_distance, parameters_.max_side_difference,
-         parameters_.min_triangle_match_ratio});
-    double tau = parameters_.initial_descriptor_distance;
-    while (true) {
-      std::vector<hierarchy::baseline::PointMatch> pairs = matches.points(tau);
-      tau += parameters_.descriptor_distance_step;
-      if (pairs.size() >= static_cast<std::size_t>(parameters_.min_associations) ||
-          tau > parameters_.max_descriptor_distance) {
-        return pairs;
-      }
-    }
-  }
-
-  geoslam_mapper::BaselineMapperParameters parameters_;
+  baselines::mapper::Parameters parameters_;
   std::vector<Eigen::Vector2d> landmarks_m_;
-  hierarchy::baseline::Hierarchy hierarchy_;
+  baselines::hierarchy::Hierarchy hierarchy_;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
 #include <optional>
 
 #include "common/terminal/interrupt.hpp"
@@ -11,19 +12,19 @@
 #include "eval/tools/memory.hpp"
 #include "eval/tools/quantile.hpp"
 #include "eval/tools/thread_clock.hpp"
-#include "services/geoslam_mapper/geoslam_mapper.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 
 namespace understory::eval::experiments::partition {
 namespace {
 
-geoslam_mapper::MapperParameters mapper_parameters(const Keeping& keeping) {
-  geoslam_mapper::MapperParameters parameters;
-  parameters.smoothing.use_odometry = true;
-  parameters.smoothing.gyro_walk = 0.0;
-  parameters.smoothing.start_wait_s = 0.0;
-  parameters.smoothing.condense_m = keeping.size_m;
-  parameters.smoothing.hand_over_m = keeping.hand_over_m;
-  parameters.smoothing.condense_of_range = 1000.0;
+geoslam_mapper::SmoothingMapperParameters mapper_parameters(const Keeping& keeping) {
+  geoslam_mapper::SmoothingMapperParameters parameters;
+  parameters.use_odometry = true;
+  parameters.gyro_walk = 0.0;
+  parameters.start_wait_s = 0.0;
+  parameters.condense_m = keeping.size_m;
+  parameters.hand_over_m = keeping.hand_over_m;
+  parameters.condense_of_range = 1000.0;
   return parameters;
 }
 
@@ -52,7 +53,8 @@ DriveResult drive(const RouteParameters& parameters, std::uint64_t seed, const K
   ms.reserve(route.size());
 
   const std::ptrdiff_t before = tools::heap_in_use();
-  const auto mapper = geoslam_mapper::make_mapper(mapper_parameters(keeping));
+  const auto mapper =
+      std::make_unique<geoslam_mapper::smoothing::SmoothingMapper>(mapper_parameters(keeping));
   std::ptrdiff_t mapper_bytes = tools::heap_in_use() - before;
 
   for (std::size_t k = 0; k < route.size(); ++k) {

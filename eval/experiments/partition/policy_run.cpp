@@ -148,7 +148,7 @@ geoslam_mapper::SmoothingMapperParameters ideal_parameters() {
 }
 
 geoslam_mapper::SmoothingMapperParameters configured_parameters(const std::filesystem::path& dir) {
-  geoslam_mapper::MapperParameters parameters;
+  geoslam_mapper::SmoothingMapperParameters parameters;
   geoslam_mapper::MapperInputParameters input;
   geoslam_mapper::MapperOutputParameters output;
   bus::ParameterTable table;
@@ -156,7 +156,7 @@ geoslam_mapper::SmoothingMapperParameters configured_parameters(const std::files
   geoslam_mapper::describe(input, table);
   geoslam_mapper::describe(output, table);
   table.load(dir / "geoslam_mapper.toml");
-  return parameters.smoothing;
+  return parameters;
 }
 
 PolicyRun map_drive(const RecordedDrive& drive, const Policy& policy,

@@ -10,7 +10,6 @@
 #include "common/model/odometry.hpp"
 #include "eval/experiments/partition/route.hpp"
 #include "eval/metrics/victoria_park_score.hpp"
-#include "services/geoslam_mapper/mapper_method.hpp"
 
 namespace understory::eval::experiments::partition {
 

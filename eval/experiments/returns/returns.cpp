@@ -12,7 +12,7 @@
 #include "eval/harness/block.hpp"
 #include "eval/tools/quantile.hpp"
 #include "eval/tools/thread_clock.hpp"
-#include "services/geoslam_mapper/geoslam_mapper.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 #include "sim/point_grid.hpp"
 
 namespace understory::eval::experiments::returns {
@@ -236,15 +236,16 @@ class Simulation {
   std::uint64_t sequence_ = 0;
 };
 
-geoslam_mapper::MapperParameters mapper_parameters() {
-  geoslam_mapper::MapperParameters parameters;
-  parameters.smoothing.use_odometry = true;
-  parameters.smoothing.gyro_walk = 0.0;
+geoslam_mapper::SmoothingMapperParameters mapper_parameters() {
+  geoslam_mapper::SmoothingMapperParameters parameters;
+  parameters.use_odometry = true;
+  parameters.gyro_walk = 0.0;
   return parameters;
 }
 
-void score_trajectory(const geoslam_mapper::MapperMethod& mapper, const Simulation& simulation,
-                      const geometry::SE2& map_T_world, ReturnScore& score) {
+void score_trajectory(const geoslam_mapper::smoothing::SmoothingMapper& mapper,
+                      const Simulation& simulation, const geometry::SE2& map_T_world,
+                      ReturnScore& score) {
   double squared = 0.0;
   const auto trajectory = mapper.trajectory();
   for (const model::KeyframePose& pose : trajectory) {
@@ -263,7 +264,7 @@ void score_trajectory(const geoslam_mapper::MapperMethod& mapper, const Simulati
 ReturnScore drive(const ReturnDrive& drive, const sim::Forest& surveyed, std::uint64_t seed) {
   const sim::Forest forest = without_touching(surveyed);
   Simulation simulation(drive, forest, seed);
-  const auto mapper = geoslam_mapper::make_mapper(mapper_parameters());
+  geoslam_mapper::smoothing::SmoothingMapper mapper(mapper_parameters());
   Identities identities;
   ReturnScore score;
   std::vector<double> ms;
@@ -275,12 +276,12 @@ ReturnScore drive(const ReturnDrive& drive, const sim::Forest& surveyed, std::ui
   std::uint32_t map_id = 0;
 
   for (std::size_t k = 0; k < simulation.size(); ++k) {
-    if (k > 0) mapper->add(simulation.odometry(k));
+    if (k > 0) mapper.add(simulation.odometry(k));
     const auto keyframe = simulation.keyframe(k, trunks);
     if (!keyframe) continue;
 
     const double begin = tools::thread_time_s();
-    const model::MapUpdate update = mapper->add(*keyframe);
+    const model::MapUpdate update = mapper.add(*keyframe);
     ms.push_back(1e3 * (tools::thread_time_s() - begin));
     ++score.keyframes;
     using enum model::MapUpdateStatus;
@@ -308,7 +309,7 @@ ReturnScore drive(const ReturnDrive& drive, const sim::Forest& surveyed, std::ui
   }
 
   identities.sum_up(score);
-  score_trajectory(*mapper, simulation, map_T_world[map_id], score);
+  score_trajectory(mapper, simulation, map_T_world[map_id], score);
   if (poses > 0) score.mean_nees = nees / poses;
   score.p99_ms = tools::quantile(ms, 0.99);
   score.largest_ms = tools::quantile(ms, 1.0);

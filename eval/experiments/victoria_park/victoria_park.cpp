@@ -2,8 +2,8 @@
 
 #include <chrono>
 
-#include "services/geoslam_mapper/geoslam_mapper.hpp"
-#include "services/keyframer/keyframer.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
+#include "services/keyframer/joint/joint_keyframer.hpp"
 #include "services/landmark_extractor/landmark_extractor.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
 
@@ -35,51 +35,51 @@ class Drive {
   Drive(const VictoriaParkConfig& config, VictoriaParkRun& run)
       : run_(run),
         extractor_(config.extractor),
-        keyframer_(make_keyframer(config.keyframer)),
-        mapper_(make_mapper(config.mapper)) {}
+        keyframer_(config.keyframer),
+        mapper_(config.mapper) {}
 
   void add(const model::Odometry& odometry) {
-    keyframer_->add(odometry);
-    mapper_->add(odometry);
+    keyframer_.add(odometry);
+    mapper_.add(odometry);
   }
 
   void add(const model::PlanarScan& scan) {
     const model::LandmarkScan landmarks =
         timed(run_.times.extractor_s, [&] { return extractor_.extract(scan); });
     run_.detections += landmarks.detections.size();
-    const auto keyframe = timed(run_.times.keyframer_s, [&] { return keyframer_->add(landmarks); });
+    const auto keyframe = timed(run_.times.keyframer_s, [&] { return keyframer_.add(landmarks); });
     if (!keyframe) {
       run_.times.mapper_s.push_back(0.0);
       return;
     }
-    run_.updates.push_back(timed(run_.times.mapper_s, [&] { return mapper_->add(*keyframe); }));
+    run_.updates.push_back(timed(run_.times.mapper_s, [&] { return mapper_.add(*keyframe); }));
     const model::MapUpdate& update = run_.updates.back();
     if (metrics::localised(update)) run_.live.push_back({update.utime, update.map_T_vehicle});
   }
 
   void finish() {
     std::vector<metrics::StampedPose> keyframes;
-    for (const model::KeyframePose& pose : mapper_->trajectory()) {
+    for (const model::KeyframePose& pose : mapper_.trajectory()) {
       keyframes.push_back({pose.utime, pose.map_T_vehicle});
     }
     run_.trajectory = fill_between(keyframes, run_.dead_reckoned);
-    run_.landmarks = mapper_->landmarks();
-    run_.keyframes_withheld = keyframer_->counters().keyframes_withheld;
-    run_.last_withheld_reason = keyframer_->counters().last_reason;
+    run_.landmarks = mapper_.landmarks();
+    run_.keyframes_withheld = keyframer_.counters().keyframes_withheld;
+    run_.last_withheld_reason = keyframer_.counters().last_reason;
   }
 
  private:
   VictoriaParkRun& run_;
   landmark_extractor::LandmarkExtractor extractor_;
-  std::unique_ptr<keyframer::KeyframerMethod> keyframer_;
-  std::unique_ptr<geoslam_mapper::MapperMethod> mapper_;
+  keyframer::joint::JointKeyframer keyframer_;
+  geoslam_mapper::smoothing::SmoothingMapper mapper_;
 };
 
 }  // namespace
 
 VictoriaParkConfig victoria_park_defaults() {
   VictoriaParkConfig config;
-  config.mapper.smoothing.use_odometry = true;
+  config.mapper.use_odometry = true;
   return config;
 }
 

@@ -21,8 +21,8 @@ namespace understory::eval::experiments::victoria_park {
 /// Parameters of the three stages, and how much of the recording is used.
 struct VictoriaParkConfig {
   landmark_extractor::LandmarkExtractorParameters extractor;
-  keyframer::KeyframerParameters keyframer;
-  geoslam_mapper::MapperParameters mapper;
+  keyframer::JointKeyframerParameters keyframer;
+  geoslam_mapper::SmoothingMapperParameters mapper;
   double end_s = 1e9;  ///< Stop the drive here [s].
 };
 

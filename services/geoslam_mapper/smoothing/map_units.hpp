@@ -7,7 +7,7 @@
 
 #include "common/model/map.hpp"
 #include "common/model/submap.hpp"
-#include "services/geoslam_mapper/mapper_method.hpp"
+#include "services/geoslam_mapper/mapper_output.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 

@@ -6,7 +6,13 @@
 #include <span>
 #include <vector>
 
-#include "services/geoslam_mapper/mapper_method.hpp"
+#include "common/model/ekf_output.hpp"
+#include "common/model/existence.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/map.hpp"
+#include "common/model/odometry.hpp"
+#include "common/model/submap.hpp"
+#include "services/geoslam_mapper/mapper_output.hpp"
 #include "services/geoslam_mapper/parameters.hpp"
 #include "services/geoslam_mapper/smoothing/closures.hpp"
 #include "services/geoslam_mapper/smoothing/common_error.hpp"
@@ -28,8 +34,8 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// A map and the vehicle in it. The work is done by the parts. See MapperMethod for the functions
-/// that it has, too; keyframes must be well-formed and in order of time.
+/// A map and the vehicle in it. The work is done by the parts. See SmoothingMapper for the
+/// functions that it has, too; keyframes must be well-formed and in order of time.
 class OneMap {
  public:
   /// An empty map. `id`: upper 16 bit of its landmarks' ids.

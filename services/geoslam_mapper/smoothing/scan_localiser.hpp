@@ -6,7 +6,7 @@
 #include "common/geometry/registration.hpp"
 #include "common/model/archive.hpp"
 #include "common/model/level.hpp"
-#include "services/geoslam_mapper/mapper_method.hpp"
+#include "services/geoslam_mapper/mapper_output.hpp"
 #include "services/geoslam_mapper/smoothing/landmark_map.hpp"
 #include "services/geoslam_mapper/smoothing/motion.hpp"
 #include "services/geoslam_mapper/smoothing/velocity_track.hpp"

@@ -38,10 +38,6 @@ bool is_finite(const model::Keyframe& keyframe) {
 SmoothingMapper::SmoothingMapper(const SmoothingMapperParameters& parameters)
     : parameters_(parameters), current_(parameters) {}
 
-std::unique_ptr<MapperMethod> make_smoothing_mapper(const SmoothingMapperParameters& parameters) {
-  return std::make_unique<SmoothingMapper>(parameters);
-}
-
 model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   using enum model::MapUpdateStatus;
   if (auto reason = malformed(keyframe); !reason.empty()) {
@@ -86,7 +82,7 @@ std::optional<ScanPose> SmoothingMapper::locate(const model::LandmarkScan& scan)
 }
 
 /// A step of the units moves all of them.
-std::optional<std::vector<model::MapLandmark>> SmoothingMapper::take_changed_landmarks() {
+std::vector<model::MapLandmark> SmoothingMapper::take_changed_landmarks() {
   std::vector<model::MapLandmark> changed =
       current_.take_changed_landmarks(kAroundVehicle_m / units_.factor());
   if (units_.take_step()) changed = current_.map().all_landmarks();

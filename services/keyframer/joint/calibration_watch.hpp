@@ -10,7 +10,7 @@
 #include "common/model/odometry_buffer.hpp"
 #include "services/keyframer/joint/jump_watch.hpp"
 #include "services/keyframer/joint/motion_difference.hpp"
-#include "services/keyframer/keyframer_method.hpp"
+#include "services/keyframer/reports.hpp"
 
 namespace understory::keyframer::joint {
 

@@ -8,21 +8,25 @@
 #include <vector>
 
 #include "common/model/detection_noise.hpp"
+#include "common/model/ekf_output.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/landmarks.hpp"
 #include "common/model/level.hpp"
 #include "common/model/odometry_buffer.hpp"
 #include "services/keyframer/joint/bias_track.hpp"
 #include "services/keyframer/joint/calibration_watch.hpp"
 #include "services/keyframer/joint/member_block.hpp"
 #include "services/keyframer/joint/scan_tracker.hpp"
-#include "services/keyframer/keyframer_method.hpp"
 #include "services/keyframer/parameters.hpp"
+#include "services/keyframer/reports.hpp"
 
 namespace understory::keyframer::joint {
 
-/// The method `joint`. Its keyframes are in the frame `centre`, in which the errors of the member
-/// poses sum to zero and the landmarks' errors are as independent as they can be
-/// (block_adjustment.hpp).
-class JointKeyframer final : public KeyframerMethod {
+/// Local bundle adjustment (GeoSLAM §4.2, algorithm 2): n scans become one keyframe. All inputs
+/// come in order of time; what cannot be used is counted, never thrown. Keyframes are in the frame
+/// `centre`, in which the errors of the member poses sum to zero and the landmarks' errors are as
+/// independent as they can be (block_adjustment.hpp).
+class JointKeyframer {
  public:
   /// Starts without any landmark.
   explicit JointKeyframer(const JointKeyframerParameters& parameters);
@@ -30,26 +34,31 @@ class JointKeyframer final : public KeyframerMethod {
   /// A scan that is not later than the last one is refused. One that matches too little of the
   /// local map ends the keyframe: what was gathered (two scans or more) is given out as a short
   /// one. Cost O(detections) per scan, O(observations n + n^3) for the n-th of a keyframe.
-  std::optional<model::Keyframe> add(const model::LandmarkScan& scan) override;
-  /// Where a keyframe is one or two scans, the first ones wait until three more scans show how far
-  /// detections scatter: the map's frame would keep what is stated wrongly.
-  std::vector<model::Keyframe> take_waited() override { return std::exchange(waited_, {}); }
-  /// Increments that overlap or run backwards are ignored.
-  void add(const model::Odometry& odometry) override;
-  /// Valid for scans within 2 s of its utime.
-  void add(const model::EkfLevel& level) override { level_.set(level); }
+  std::optional<model::Keyframe> add(const model::LandmarkScan& scan);
+  /// Keyframes that come before the one that add() returned; ask after each scan. Where a keyframe
+  /// is one or two scans, the first ones wait until three more scans show how far detections
+  /// scatter: the map's frame would keep what is stated wrongly.
+  std::vector<model::Keyframe> take_waited() { return std::exchange(waited_, {}); }
+  /// Motion of the vehicle by wheels or IMU, where there is any. It must come before the scan at
+  /// its end. It predicts the next scan and bridges scans with few landmarks. Increments that
+  /// overlap or run backwards are ignored.
+  void add(const model::Odometry& odometry);
+  /// The error of roll and pitch as the filter estimates it: scans within 2 s of its utime are
+  /// corrected by it.
+  void add(const model::EkfLevel& level) { level_.set(level); }
 
-  InputQuality input_quality() const override {
+  /// What the scans say of themselves and of odometry.
+  InputQuality input_quality() const {
     return {noise_.is_adjusting(), calibration_.error(), calibration_.lately(),
             calibration_.contradicts()};
   }
   /// Counts for HEALTH.
-  const KeyframerCounters& counters() const override { return counters_; }
+  const KeyframerCounters& counters() const { return counters_; }
 
   /// The format is "keyframer.joint" of common/state.
-  std::string save() const override;
+  std::string save() const;
   /// Throws std::invalid_argument on other bytes; the state is then as before.
-  void load(const std::string& bytes) override;
+  void load(const std::string& bytes);
 
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
