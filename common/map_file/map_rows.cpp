@@ -117,7 +117,7 @@ void select_loops(const Connection& connection, StoredMap& map) {
 void refuse_landmarks_of_others(const Connection& connection, const StoredMap& map) {
   Statement row = connection.prepare("SELECT map_id FROM landmarks WHERE landmark_id = ?1");
   for (const StoredLandmark& one : map.landmarks) {
-    if (row.bind(signed_of(one.landmark.id)).step())
+    if (row.bind(static_cast<std::int64_t>(one.landmark.id)).step())
       throw MapFileError(
           Fault::kRefused,
           fmt::format("{}: map {} is not stored: its landmark {} is in map {} already",
