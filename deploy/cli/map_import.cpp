@@ -139,7 +139,7 @@ void keep_same_frame(const MapImportOptions& options,
   const auto is_known = [&](const StoredMap& map) {
     return std::ranges::find(known, map.map_id, &map_file::MapSummary::map_id) != known.end();
   };
-  const auto first_other = std::ranges::stable_partition(maps, is_known).begin();
+  const auto first_other = std::stable_partition(maps.begin(), maps.end(), is_known);
   std::string others;
   for (auto one = first_other; one != maps.end(); ++one)
     others += fmt::format("{}{}", others.empty() ? "" : ", ", one->map_id);

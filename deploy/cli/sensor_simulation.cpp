@@ -111,12 +111,14 @@ bool is_sensor_world(std::string_view world) {
 
 std::vector<std::string> sensor_worlds() {
   std::vector<std::string> names;
+  names.reserve(kSensorWorlds.size());
   for (const SensorWorld& world : kSensorWorlds) names.emplace_back(world.name);
   return names;
 }
 
 std::vector<std::string> lidar_names() {
   std::vector<std::string> names;
+  names.reserve(kLasers.size() + 1);
   for (const Laser& laser : kLasers) names.emplace_back(laser.name);
   names.emplace_back(kNoLaser);
   return names;
