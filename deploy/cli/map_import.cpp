@@ -97,13 +97,15 @@ std::uint32_t next_free(const std::vector<map_file::MapSummary>& maps) {
   return maps.empty() ? 1 : maps.back().map_id + 1;
 }
 
+bool has_map(const std::vector<map_file::MapSummary>& known, std::uint32_t map_id) {
+  return std::ranges::find(known, map_id, &map_file::MapSummary::map_id) != known.end();
+}
+
 void refuse_known(const MapImportOptions& options, const std::vector<StoredMap>& maps,
                   const std::vector<map_file::MapSummary>& known) {
   if (options.replace) return;
   for (const StoredMap& map : maps) {
-    const bool is_known =
-        std::ranges::find(known, map.map_id, &map_file::MapSummary::map_id) != known.end();
-    if (is_known)
+    if (has_map(known, map.map_id))
       fail(fmt::format("{}: has a map {} already (--replace puts the new one in its place)",
                        options.out, map.map_id));
   }
@@ -113,9 +115,7 @@ void refuse_known(const MapImportOptions& options, const std::vector<StoredMap>&
 std::uint32_t joined_map(const StoredMap& map, const std::vector<map_file::MapSummary>& known) {
   for (const map_file::StoredLandmark& one : map.landmarks) {
     const std::uint32_t from = model::map_of(one.landmark.id);
-    const bool is_other = from != map.map_id;
-    if (is_other && std::ranges::find(known, from, &map_file::MapSummary::map_id) != known.end())
-      return from;
+    if (from != map.map_id && has_map(known, from)) return from;
   }
   return 0;
 }
@@ -136,9 +136,7 @@ void refuse_joined(const MapImportOptions& options, const std::vector<StoredMap>
 /// began later (the vehicle was lost) has a frame of its own.
 void keep_same_frame(const MapImportOptions& options,
                      const std::vector<map_file::MapSummary>& known, std::vector<StoredMap>& maps) {
-  const auto is_known = [&](const StoredMap& map) {
-    return std::ranges::find(known, map.map_id, &map_file::MapSummary::map_id) != known.end();
-  };
+  const auto is_known = [&](const StoredMap& map) { return has_map(known, map.map_id); };
   const auto first_other = std::stable_partition(maps.begin(), maps.end(), is_known);
   std::string others;
   for (auto one = first_other; one != maps.end(); ++one)

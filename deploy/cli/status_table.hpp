@@ -41,8 +41,8 @@ class StatusTable {
   std::map<std::string, Entry> latest_;  ///< By name of the process.
 };
 
-/// What is told of the pose: by the poses that were heard, and where none was by what the processes
-/// say in HEALTH. No pose now and some before is silence; waiting is before the first one.
+/// State of the pose: from the poses received; where none was received, from HEALTH. With poses
+/// sent before it is silent, without any it is waiting.
 viewer::Verdict pose_verdict(const viewer::Verdict& heard, const StatusTable& table);
 
 }  // namespace understory::cli

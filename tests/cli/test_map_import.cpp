@@ -244,7 +244,8 @@ TEST_CASE("what is imported has the states of its landmarks, and says so", "[cli
   CHECK(messages[0].states == "state");
 }
 
-TEST_CASE("of a drive in a given map that began another map, that other one is told", "[cli]") {
+TEST_CASE("a drive in a given map that began another map: the import names the other one",
+          "[cli]") {
   const TemporaryDirectory directory;
   const auto run = [&](const std::string& arguments) {
     return understory_command(directory, arguments);

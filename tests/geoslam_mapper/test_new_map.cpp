@@ -249,6 +249,7 @@ TEST_CASE("A new map begins as well where a landmark needs two keyframes", "[new
   SmoothingMapperParameters parameters = with_odometry();
   parameters.min_observations = 2;
   parameters.min_matched = 3;
+
   for (std::uint64_t seed = 370; seed < 376; ++seed) {
     SmoothingMapper mapper(parameters);
     std::vector<model::MapUpdate> updates;
@@ -267,6 +268,7 @@ TEST_CASE("A new map begins as well where a landmark needs two keyframes", "[new
       CHECK(is_placed(updates.back()));
       late_us = last->utime + 60'000'000;
     }
+
     CHECK(updates.back().map_id == 2);
     CHECK(mapper.kept_maps().maps().size() == 1);
   }

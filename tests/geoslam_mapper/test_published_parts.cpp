@@ -219,7 +219,7 @@ TEST_CASE("a pose has the odometry's frame, the jumps so far and the given map's
   CHECK(poses.given_covariance_at({}, 2).isZero(0.0));
 }
 
-TEST_CASE("landmarks of a submap that went are told to nobody", "[published]") {
+TEST_CASE("no message has landmarks of a submap that was given away", "[published]") {
   Landmarks held{landmark(1, 0.0), landmark(2, 5.0)};
   PublishedMap map = published();
   tell(map, updated(), held);
