@@ -6,6 +6,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using geoslam_mapper::smoothing::LocatedKeyframe;
 using geoslam_mapper::smoothing::RangeScale;
 
 namespace {
@@ -32,7 +33,7 @@ struct ScaledDrive {
 
       map_T_vehicle =
           map_T_vehicle * geometry::SE2((1.0 + range_error) * step.translation(), step.theta());
-      RangeScale::Located located;
+      LocatedKeyframe located;
       located.utime = i;
       located.map_T_vehicle =
           geometry::SE2(map_T_vehicle.translation() +
@@ -105,7 +106,7 @@ TEST_CASE("A motion that contradicts odometry does not count", "[range scale]") 
   RangeScale scale(0.002, 0.0);
   drive.run(scale, 300);
   const double before = scale.map_factor();
-  RangeScale::Located slipped = *scale.last();
+  LocatedKeyframe slipped = *scale.last();
   slipped.map_T_vehicle = slipped.map_T_vehicle * geometry::SE2(4.0, 0.0, 0.0);
   geometry::SE2WithCovariance odometry{geometry::SE2(2.0, 0.0, 0.0),
                                        1e-4 * Eigen::Matrix3d::Identity()};

@@ -16,9 +16,9 @@ double squared(double value) { return value * value; }
 
 }  // namespace
 
-void RangeScale::add(const Located& located,
+void RangeScale::add(const LocatedKeyframe& located,
                      const std::optional<geometry::SE2WithCovariance>& odometry) {
-  const std::optional<Located> before = std::exchange(last_, located);
+  const std::optional<LocatedKeyframe> before = std::exchange(last_, located);
   if (!before || !odometry || range_sigma_ <= 0.0) return;
 
   const Eigen::Vector2d by_landmarks =
@@ -64,7 +64,7 @@ double RangeScale::sigma() const {
   return range_sigma_ * std::sqrt(other / (squared(range_sigma_) + other));
 }
 
-std::optional<RangeScale::Located> located_by_landmarks(
+std::optional<LocatedKeyframe> located_by_landmarks(
     const model::Keyframe& keyframe, std::span<const model::Association> associations,
     std::span<const Eigen::Vector2d> positions_m) {
   if (associations.size() < kLeastLandmarks) return std::nullopt;
@@ -75,8 +75,8 @@ std::optional<RangeScale::Located> located_by_landmarks(
   }
 
   const model::KeyframeMember& last = keyframe.members.back();
-  return RangeScale::Located{last.utime, alignment.a_T_b() * last.centre_T_vehicle,
-                             1.0 / alignment.weight()};
+  return LocatedKeyframe{last.utime, alignment.a_T_b() * last.centre_T_vehicle,
+                         1.0 / alignment.weight()};
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -12,6 +12,19 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
+/// Where landmarks alone place the vehicle at a time.
+struct LocatedKeyframe {
+  model::Utime utime = 0;
+  geometry::SE2 map_T_vehicle;
+  double variance_m2 = 0.0;  ///< Per axis.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.utime, s.map_T_vehicle, s.variance_m2);
+  }
+};
+
 /// Distances that a laser or a detector measures may all be too short or too long by the same
 /// share: a trunk is seen from its front, a clock is off by some ppm. No landmark shows it, since
 /// the whole map is smaller then. Odometry does, if its own scale is known better: the ratio of the
@@ -27,23 +40,12 @@ class RangeScale {
   RangeScale(double range_sigma, double odometry_sigma)
       : range_sigma_(range_sigma), odometry_sigma_(odometry_sigma) {}
 
-  /// Where landmarks alone place the vehicle at a time.
-  struct Located {
-    model::Utime utime = 0;
-    geometry::SE2 map_T_vehicle;
-    double variance_m2 = 0.0;  ///< Per axis.
-
-    /// Members of a saved state; see common/state.
-    template <class Archive, class Self>
-    static void archive(Archive& a, Self& s) {
-      a(s.utime, s.map_T_vehicle, s.variance_m2);
-    }
-  };
   /// The last one that add() took; none before the first.
-  const std::optional<Located>& last() const { return last_; }
+  const std::optional<LocatedKeyframe>& last() const { return last_; }
   /// Takes the next one, with odometry since last() as it came (right perturbation); none where
   /// there is a gap. A motion that contradicts odometry does not count.
-  void add(const Located& located, const std::optional<geometry::SE2WithCovariance>& odometry);
+  void add(const LocatedKeyframe& located,
+           const std::optional<geometry::SE2WithCovariance>& odometry);
   /// The same knowledge for a map that begins now.
   RangeScale beside() const;
   /// The map in use is given: its scale is known.
@@ -70,7 +72,7 @@ class RangeScale {
 
   double range_sigma_;
   double odometry_sigma_;
-  std::optional<Located> last_;
+  std::optional<LocatedKeyframe> last_;
   double products_ = 0.0;  ///< Of motions by landmarks and by odometry, over their variance.
   double squares_ = 0.0;   ///< Of motions by odometry.
   bool is_held_ = false;
@@ -78,7 +80,7 @@ class RangeScale {
 
 /// Where landmarks of the map place a keyframe's last member, by a rigid fit to their positions and
 /// no prior; none with fewer than six. `positions_m`: of the associated landmarks, frame `map`.
-std::optional<RangeScale::Located> located_by_landmarks(
+std::optional<LocatedKeyframe> located_by_landmarks(
     const model::Keyframe& keyframe, std::span<const model::Association> associations,
     std::span<const Eigen::Vector2d> positions_m);
 
