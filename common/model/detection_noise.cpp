@@ -119,6 +119,7 @@ void DetectionNoise::add(const LandmarkScan& scan, std::span<const std::uint64_t
   ++since_other_;
   if (const auto common = common_with_last(kLag)) learn(common->pairs, common->fit);
   for (std::size_t lag = 0; lag < kLags.size(); ++lag) learn_lag(lag);
+  update_factors();
   note_changes();
 }
 
@@ -127,8 +128,8 @@ void DetectionNoise::note_changes() {
   scans_since_told_ = std::min(scans_since_told_ + 1, kSettled);
   const std::vector<Seen>& seen = recent_.back().seen;
   if (seen.size() < kLeastPairs) return;
-  std::array<double, kKinds * kRanges> logarithm{};
-  for (std::size_t bin = 0; bin < logarithm.size(); ++bin) logarithm[bin] = std::log(learned(bin));
+  Factors logarithm{};
+  for (std::size_t bin = 0; bin < kBins; ++bin) logarithm[bin] = std::log(learned_[bin]);
   double sum = 0.0;
   for (const Seen& one : seen) sum += logarithm[bin_of(one.kind, one.position_m.norm())];
 
@@ -164,7 +165,7 @@ void DetectionNoise::learn_lag(std::size_t lag) {
 DetectionNoise::Sums DetectionNoise::left_over(const Pair& pair, const Fit& fit,
                                                double usual) const {
   static const double kCut = 1.0 - std::exp(-0.5 * kMostChi2);
-  const Residual residual = residual_of(pair, estimate(pair.bin), fit.then_T_now);
+  const Residual residual = residual_of(pair, estimates_[pair.bin], fit.then_T_now);
   const double taken = (fit.covariance * residual.information).trace();
   const double degrees = std::max(0.0, 2.0 - taken);
   const double share = 0.5 * degrees;
@@ -196,10 +197,10 @@ std::optional<ScanMotion> DetectionNoise::motion_over(std::size_t most_scans) co
 }
 
 void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
-  std::array<Sums, kKinds * kRanges> added{};
+  std::array<Sums, kBins> added{};
   for (const Pair& pair : pairs) {
     const Sums left = left_over(pair, fit, 1.0);
-    added[pair.bin].chi2 += estimate(pair.bin) * left.chi2;
+    added[pair.bin].chi2 += estimates_[pair.bin] * left.chi2;
     added[pair.bin].degrees += left.degrees;
   }
 
@@ -210,7 +211,7 @@ void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
   for (std::size_t bin = 0; bin < sums_.size(); ++bin) {
     all.chi2 += added[bin].chi2;
     all.degrees += added[bin].degrees;
-    expected += estimate(bin) * added[bin].degrees;
+    expected += estimates_[bin] * added[bin].degrees;
   }
   // Scans before and after a change of all noise have no lag between them. One range alone is other
   // by chance too often.
@@ -225,6 +226,7 @@ void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
     sums.degrees += added[bin].degrees;
     sums.forget_beyond(kMemory);
   }
+  update_estimates();
 }
 
 DetectionNoise::Residual DetectionNoise::residual_of(const Pair& pair, double factor,
@@ -252,7 +254,7 @@ DetectionNoise::Fit DetectionNoise::fitted_motion(std::span<const Pair> pairs) c
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     for (const Pair& pair : pairs) {
-      const Residual residual = residual_of(pair, estimate(pair.bin), fit.then_T_now);
+      const Residual residual = residual_of(pair, estimates_[pair.bin], fit.then_T_now);
       const double doubt = std::max(1.0, residual.chi2 / kMostChi2);
       information += residual.information / doubt;
       gradient += residual.gradient / doubt;
@@ -297,16 +299,29 @@ bool DetectionNoise::may_shrink(LandmarkKind kind) const {
   return !outlasts(variogram(kind), kMostGrowth);
 }
 
-double DetectionNoise::learned(std::size_t bin) const {
-  return estimate(bin) * repetition(static_cast<LandmarkKind>(bin / kRanges));
+void DetectionNoise::update_estimates() {
+  for (std::size_t bin = 0; bin < kBins; ++bin) estimates_[bin] = estimate(bin);
 }
 
-double DetectionNoise::factor_of(std::size_t bin) const {
-  const double learned = this->learned(bin);
+void DetectionNoise::update_factors() {
+  update_estimates();
+  for (std::size_t first = 0; first < kBins; first += kRanges) {
+    const auto kind = static_cast<LandmarkKind>(first / kRanges);
+    const double repeated = repetition(kind);
+    const bool shrinks = may_shrink(kind);
+    for (std::size_t bin = first; bin < first + kRanges; ++bin) {
+      learned_[bin] = estimates_[bin] * repeated;
+      factors_[bin] = factor_of(bin, shrinks);
+    }
+  }
+}
+
+double DetectionNoise::factor_of(std::size_t bin, bool may_shrink) const {
+  const double learned = learned_[bin];
   const bool is_corner = bin / kRanges == static_cast<std::size_t>(LandmarkKind::kCorner);
   const double below = is_corner ? parameters_.replace_corners_below : parameters_.replace_below;
   if (learned < parameters_.replace_above && learned > below) return 1.0;
-  if (learned < 1.0 && !may_shrink(static_cast<LandmarkKind>(bin / kRanges))) return 1.0;
+  if (learned < 1.0 && !may_shrink) return 1.0;
 
   // By chance?
   const std::size_t first = bin / kRanges * kRanges;
@@ -316,7 +331,7 @@ double DetectionNoise::factor_of(std::size_t bin) const {
 }
 
 double DetectionNoise::factor(LandmarkKind kind, double range_m) const {
-  return factor_of(bin_of(kind, range_m));
+  return factors_[bin_of(kind, range_m)];
 }
 
 LandmarkScan DetectionNoise::corrected(LandmarkScan scan) const {
@@ -369,10 +384,7 @@ bool DetectionNoise::is_new() const {
 }
 
 bool DetectionNoise::is_misstated() const {
-  for (std::size_t bin = 0; bin < sums_.size(); ++bin) {
-    if (factor_of(bin) != 1.0) return true;
-  }
-  return false;
+  return std::ranges::any_of(factors_, [](double factor) { return factor != 1.0; });
 }
 
 }  // namespace understory::model

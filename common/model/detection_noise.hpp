@@ -88,7 +88,9 @@ class DetectionNoise {
   std::size_t in_common(const LandmarkScan& scan, std::span<const std::uint64_t> tracks) const;
   /// Tracking broke off: what little was learned may be from wrong pairs.
   void forget_while_new() {
-    if (is_new()) sums_ = {};
+    if (!is_new()) return;
+    sums_ = {};
+    update_factors();
   }
   /// True where the factor of any kind and range is not 1.
   bool is_misstated() const;
@@ -105,6 +107,7 @@ class DetectionNoise {
   static void archive(Archive& a, Self& self) {
     a(self.sums_, self.by_lag_, self.since_other_, self.recent_, self.told_,
       self.scans_since_told_);
+    if constexpr (Archive::kReads) self.update_factors();
   }
 
  private:
@@ -122,6 +125,16 @@ class DetectionNoise {
 
   static constexpr std::size_t kKinds = 2;
   static constexpr std::size_t kRanges = 4;
+  static constexpr std::size_t kBins = kKinds * kRanges;
+
+  /// A factor of the variance for each bin of kind and range.
+  using Factors = std::array<double, kBins>;
+  /// All factors are 1.
+  static constexpr Factors stated() {
+    Factors factors{};
+    factors.fill(1.0);
+    return factors;
+  }
 
   /// A detection of an earlier scan.
   struct Seen {
@@ -202,12 +215,13 @@ class DetectionNoise {
   std::array<LagVariance, kLags.size()> variogram(LandmarkKind kind) const;
   bool may_shrink(LandmarkKind kind) const;
   double estimate(std::size_t bin) const;
-  double learned(std::size_t bin) const;
-  double factor_of(std::size_t bin) const;
+  void update_estimates();
+  void update_factors();
+  double factor_of(std::size_t bin, bool may_shrink) const;
   void note_changes();
 
   DetectionNoiseParameters parameters_;
-  std::array<Sums, kKinds * kRanges> sums_{};
+  std::array<Sums, kBins> sums_{};
   /// Of residuals at each lag, by their noise as learned in `sums_`.
   std::array<std::array<Sums, kLags.size()>, kKinds> by_lag_{};
   std::size_t since_other_ = 0;  ///< Scans since the noise was quite different.
@@ -216,6 +230,10 @@ class DetectionNoise {
   double told_ = 0.0;
   std::size_t scans_since_told_ = 0;
   std::deque<SeenScan> recent_;  ///< The last scans, the newest at the end.
+  // From the sums above, for each bin; each scan uses them for each of its detections.
+  Factors estimates_ = stated();  ///< By `sums_` alone.
+  Factors learned_ = stated();    ///< And by what errors repeat.
+  Factors factors_ = stated();    ///< That are used: 1 where the stated covariance is kept.
 };
 
 }  // namespace understory::model
