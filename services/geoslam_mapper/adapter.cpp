@@ -19,13 +19,12 @@
 namespace understory::geoslam_mapper {
 namespace {
 
-/// Members for which a KEYFRAME has room beside its landmarks; usual are 8.
+/// Members that fit into a KEYFRAME beside its landmarks; usually there are 8.
 constexpr std::size_t kMembers = 64;
-/// Members that may have a detection of each of its landmarks.
+/// Assumed number of members that detected each landmark.
 constexpr std::size_t kUsualMembers = 16;
 
-/// Bytes of a SUBMAP with so many landmarks: its keyframes and its payload take
-/// as much again.
+/// Bytes of a SUBMAP with this number of landmarks: its keyframes and its payload double the size.
 std::size_t submap_bytes(std::size_t landmarks) {
   return 8 * wire::bytes_with<submap_t, map_landmark_t>(landmarks);
 }
@@ -34,7 +33,7 @@ constexpr std::size_t kSubmapLandmarks = 2000;
 
 constexpr state::Format kFormat{"geoslam_mapper", 10};
 
-/// The state between the mapper's and the bus: each part computes for itself.
+/// State between the mapper and the bus: the parts compute, the adapter only connects them.
 struct Parts {
   PublishedMap map;
   PoseStream poses;
@@ -92,7 +91,7 @@ class MapperAdapter : public bus::Adapter {
   void state_was_lost(std::int64_t written_s) override {
     const NumbersAfterLoss first = numbers_after_loss(written_s);
     parts_->poses.begin_behind(first.resets);
-    // A given map has its number.
+    // A given map has a number already.
     if (parts_->map.map_id() == 0) stage_->begin_with_number(first.map_id);
   }
 
@@ -116,8 +115,8 @@ class MapperAdapter : public bus::Adapter {
              kMembers * wire::element_bytes<keyframe_member_t>() +
              kUsualMembers * most_landmarks * wire::element_bytes<keyframe_detection_t>()});
 
-    // Not in the journal: a scan changes nothing in the map, and the next one
-    // is located anew.
+    // Not in the journal: a scan does not change the map, and the next one is localised
+    // independently.
     node.subscribe<model::LandmarkScan>(
         channels_.landmarks, [this](const model::LandmarkScan& scan) { on_scan(scan); },
         {.most_bytes = wire::bytes_with<landmarks_t, detection_t>(most_detections),
@@ -129,8 +128,7 @@ class MapperAdapter : public bus::Adapter {
         [this](const model::ViewRanges& ranges) { parts_->sights.add(ranges); },
         {.queue_size = 100});
 
-    // Small, and each one that is lost breaks the chain of motion: a long
-    // queue.
+    // Small, but a lost increment is a gap in the motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& motion) {
                                       stage_->add(motion);
@@ -141,7 +139,7 @@ class MapperAdapter : public bus::Adapter {
     node.subscribe<model::RestLevel>(channels_.rest_level,
                                      [this](const model::RestLevel& level) { stage_->add(level); });
 
-    // To gate by; no measurement: it was made from the same detections.
+    // For gating only, not a measurement: it was made from the same detections.
     node.subscribe<model::EkfPose>(channels_.ekf_pose, [this](const model::EkfPose& pose) {
       stage_->add(pose);
       parts_->health.add(pose);
@@ -152,7 +150,7 @@ class MapperAdapter : public bus::Adapter {
                                   [this](const map_request_t& request) { on_request(request); },
                                   {.queue_size = 4, .sequenced = false, .journaled = false});
 
-    // From another time, and not of a sequence.
+    // A map of another time, outside the sequence of messages.
     const auto most_given = static_cast<std::size_t>(input_.max_given_landmarks);
     node.subscribe<model::WholeMap>(channels_.given_map,
                                     [this](const model::WholeMap& map) { on_given(map); },
@@ -174,8 +172,8 @@ class MapperAdapter : public bus::Adapter {
                                   [this](const model::Submap& submap) { on_reply(submap); },
                                   {.queue_size = 50, .most_bytes = submap_bytes(kSubmapLandmarks)});
 
-    // From whoever finds one or sets one; each numbers its own. Part of the
-    // map: journaled.
+    // From any process that finds or sets a closure; each numbers its own. Part of the map:
+    // journaled.
     node.subscribe<model::LoopClosure>(channels_.loop_closure,
                                        [this](const model::LoopClosure& one) { on_closure(one); },
                                        {.queue_size = 200, .sequenced = false, .timed = false});
@@ -190,7 +188,7 @@ class MapperAdapter : public bus::Adapter {
     results_.publish(result);
   }
 
-  /// An answer may come twice: then the submap is not wanted any more.
+  /// An answer may come twice: the second submap is no longer requested.
   void on_reply(const model::Submap& submap) {
     const std::vector<model::SubmapId> wanted = stage_->wanted();
     if (std::ranges::find(wanted, submap.id) == wanted.end()) return;
@@ -217,7 +215,7 @@ class MapperAdapter : public bus::Adapter {
       parts_->map.earn(corrections_.publish(*one));
   }
 
-  /// Only in the beginning: a map that exists is not replaced.
+  /// Only before the first keyframe: an existing map is not replaced.
   void on_given(const model::WholeMap& map) {
     std::string reason = why_not_given(map);
     if (parts_->map.map_id() != 0) reason = "a map is there already";
@@ -265,7 +263,7 @@ class MapperAdapter : public bus::Adapter {
     for (const bus::WatchedCondition& one : parts_->health.conditions()) node_->show(one);
   }
 
-  /// The pose of a scan at once, in the map as it is; its keyframe comes later.
+  /// Publishes the pose of a scan at once, in the present map; its keyframe comes later.
   void on_scan(const model::LandmarkScan& scan) {
     const std::optional<ScanPose> found = stage_->locate(scan);
     parts_->health.add_scan(found && found->is_coasting);

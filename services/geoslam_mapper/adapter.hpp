@@ -1,4 +1,4 @@
-// The mapper's place on the bus.
+// Connects the mapper to the bus.
 #pragma once
 
 #include <string>
@@ -34,7 +34,7 @@ struct MapperChannels {
   std::string loop_result = all.out("LOOP_RESULT", "a closure was taken or refused, and why");
 };
 
-/// The mapper as a service: name, channels and what makes its adapter.
+/// The mapper as a service: its name, its channels and the factory of its adapter.
 bus::Service geoslam_mapper_service(const MapperChannels& channels = {});
 
 }  // namespace understory::geoslam_mapper

@@ -138,7 +138,7 @@ void describe_old_keys(bus::ParameterTable& table) {
   table.renamed("ours.standing_share", "smoothing.stationary_share");
   table.renamed("ours.min_sightings", "smoothing.min_observations");
   table.renamed("ours.min_sighting_ratio", "smoothing.min_observation_ratio");
-  // The thesis's method was a choice of the mapper.
+  // Earlier versions could choose the method of the thesis.
   const std::string where = "the method of the GeoSLAM thesis runs in understory eval alone";
   table.removed("method", "the mapper has one method now; " + where);
   table.removed("baseline.", where);

@@ -8,8 +8,7 @@
 
 namespace understory::geoslam_mapper {
 
-/// What to begin with, and how much one message may hold; documented as SmoothingMapperParameters
-/// is.
+/// The given map and the size limits of messages. Documentation: see SmoothingMapperParameters.
 struct MapperInputParameters {
   std::string map_file;  ///< Empty: none.
   int map_id = 0;        ///< 0: the only one in the file with landmarks.
@@ -18,10 +17,10 @@ struct MapperInputParameters {
   int max_given_landmarks = 200000;
 };
 
-/// What the adapter decides itself; documented as SmoothingMapperParameters is.
+/// Decisions of the adapter about its outputs. Documentation: see SmoothingMapperParameters.
 struct MapperOutputParameters {
   double map_period_s = 2.0;
-  double map_share = 0.1;  ///< Of all bytes that the mapper sends.
+  double map_share = 0.1;  ///< Share of all bytes that the mapper sends.
   double moved_m = 0.001;
   double reset_distance_m = 0.5;
   double reset_angle_rad = 0.05;

@@ -25,9 +25,9 @@ bool is_sound(const model::MapLandmark& landmark) {
   return landmark.position_m.allFinite() && is_covariance<2>(landmark.covariance_m2);
 }
 
-/// Of keyframes within this of each other one is kept [m].
+/// Of keyframes within this distance of each other one is kept [m].
 constexpr double kApart_m = 5.0;
-/// Keyframes farther away than this are not looked for by place [m].
+/// Largest radius of the search in the grid [m]; beyond it all keyframes are compared.
 constexpr double kAround_m = 640.0;
 
 bool is_sound(const model::KeyframePose& keyframe) {
@@ -37,8 +37,8 @@ bool is_sound(const model::KeyframePose& keyframe) {
          is_covariance<3>(keyframe.covariance);
 }
 
-/// What is left of a covariance without its shared part, no less than `least_sigma_m`. Pose and
-/// landmark are correlated otherwise as well, so nothing may be left.
+/// A covariance without its shared part, at least `least_sigma_m`. Pose and landmark are also
+/// correlated otherwise, so the difference may be zero or negative.
 Eigen::Matrix2d without(const Eigen::Matrix2d& covariance, const Eigen::Matrix2d& shared,
                         double least_sigma_m) {
   const double least_m2 = least_sigma_m * least_sigma_m;
@@ -101,7 +101,7 @@ void GivenFrame::rebuild() {
     grid_.insert(static_cast<constellation::Slot>(i), keyframes_[i].map_T_vehicle.translation());
 }
 
-/// Looks further and further.
+/// Searches in growing radii.
 const GivenFrame::Known* GivenFrame::nearest_to(const Eigen::Vector2d& at_m) const {
   for (double radius_m = kCell_m; radius_m <= kAround_m; radius_m *= 4.0) {
     const Known* nearest = nullptr;

@@ -1,4 +1,4 @@
-// A map to begin with: from a file or from a message.
+// A given map: read from a file or received as a message.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,39 +13,40 @@
 
 namespace understory::geoslam_mapper {
 
-/// One map of a map file, its landmarks in order of id. `map_id` 0: the only one in the file
-/// that has landmarks. Throws map_file::MapFileError, or std::runtime_error that names the file
-/// where that map is not in it or has no landmark.
+/// One map of a map file, its landmarks in order of id. `map_id` 0: the only map in the file that
+/// has landmarks. Throws map_file::MapFileError, or std::runtime_error with the name of the file if
+/// that map is missing or has no landmark.
 model::WholeMap read_given_map(const std::string& file, int map_id);
 
-/// Why a message's map cannot be begun with; empty where it can: it is whole, has landmarks, and
-/// all of them are finite and in order of id.
+/// Reason why the mapper cannot start with this map; empty if it can: the map is whole, has
+/// landmarks, and they are finite and in order of id.
 std::string why_not_given(const model::WholeMap& map);
 
-/// The map's landmarks with the covariance that each has beside the keyframe nearest to it, at
-/// least `least_sigma_m`. A map that was driven states covariances relative to its first keyframe;
-/// far from there they are large, and nearly all of it neighbours share. Taken for an error of each
-/// landmark it would hide which of them a detection is. Landmarks of a map without keyframes (a
-/// survey), and those that are stated to be better than `least_sigma_m`, stay as they are.
-/// Keyframes with values that cannot be are passed over. Cost: each landmark looks around it.
+/// The map's landmarks with their covariance relative to the nearest keyframe, at least
+/// `least_sigma_m`. A driven map states covariances relative to its first keyframe; far from there
+/// they are large, and neighbours share nearly all of the error. Treated as independent errors they
+/// would make the association of detections ambiguous. Unchanged: landmarks of a map without
+/// keyframes (a survey), and those with a stated sigma below `least_sigma_m`. Keyframes with
+/// invalid values are skipped. Cost: one search for the nearest keyframe per landmark.
 std::vector<model::MapLandmark> apart_from_keyframes(const model::WholeMap& map,
                                                      double least_sigma_m);
 
-/// How well the places of a given map are known in its frame: what apart_from_keyframes() takes out
-/// of the landmarks, and what poses that are found by them must state. A map that was driven is
-/// bent as a whole by what its drive did not know; nothing that is seen in it later shows that.
+/// Uncertainty of a given map in its own frame. apart_from_keyframes() removes it from the
+/// landmarks; poses that are localised in the map must include it. Unobserved errors of the drive
+/// bend the map as a whole, and no later observation in the map reveals them.
 class GivenFrame {
  public:
-  /// Known to the last digit: no map was given, or one without keyframes (a survey).
+  /// Zero uncertainty: no map was given, or one without keyframes (a survey).
   GivenFrame() = default;
-  /// Of that map. Keyframes with values that cannot be are passed over; of those within some metres
-  /// one is kept.
+  /// Frame of this map. Keyframes with invalid values are skipped; of keyframes within kApart_m (5
+  /// m) of each other one is kept.
   explicit GivenFrame(const model::WholeMap& map);
 
-  /// Number of the map; 0 where none was given.
+  /// Number of the map; 0 if none was given.
   std::uint32_t map_id() const { return map_id_; }
-  /// Covariance of a pose that is known exactly in the map around it (right perturbation): that of
-  /// the nearest keyframe, carried to the pose. O(keyframes around it).
+  /// Covariance in the map's frame of a pose that is known exactly relative to the map around it
+  /// (right perturbation): the nearest keyframe's covariance, transported to the pose. O(keyframes
+  /// around it).
   Eigen::Matrix3d covariance_at(const geometry::SE2& map_T_vehicle) const;
 
   /// Members of a saved state; see common/state. After a load call rebuild().
@@ -74,7 +75,7 @@ class GivenFrame {
 
   std::uint32_t map_id_ = 0;
   std::vector<Known> keyframes_;
-  constellation::PointGrid grid_{kCell_m};  ///< Of them.
+  constellation::PointGrid grid_{kCell_m};  ///< Grid of the keyframes.
 };
 
 }  // namespace understory::geoslam_mapper

@@ -7,12 +7,12 @@
 namespace understory::geoslam_mapper {
 namespace {
 
-/// Message time [us] from one attempt to the next.
+/// Message time between attempts [us].
 constexpr model::Utime kAgain_us = 1000000;
 
-/// Message time from one look at the submaps' poses to the next.
+/// Message time between comparisons of the submaps' poses [us].
 constexpr model::Utime kLook_us = 10000000;
-/// Least move of a submap that is sent [m], of its node and of what lies so far from it [m].
+/// Least move of a submap that is sent [m], of its node and of points at kLever_m from it.
 constexpr double kMove_m = 0.05;
 constexpr double kLever_m = 40.0;
 

@@ -1,4 +1,4 @@
-// The way of submaps between the mapper and the store: nothing is lost where messages are.
+// Transfer of submaps between the mapper and the store; a lost message loses no submap.
 #pragma once
 
 #include <map>
@@ -12,28 +12,29 @@
 
 namespace understory::geoslam_mapper {
 
-/// Submaps that the mapper gave away and that no store has confirmed yet, and questions for those
-/// that it wants back. Each is sent again every second of message time; a confirmation or an answer
-/// may come twice.
+/// Submaps that were handed over but are not confirmed by a store yet, and requests for submaps to
+/// load again. Each is sent again every second of message time; confirmations and answers may
+/// arrive twice.
 class HandOver {
  public:
-  /// With so many unconfirmed ones nothing more is given away.
+  /// At this number of unconfirmed submaps the hand-over stops.
   static constexpr std::size_t kMostWaiting = 64;
 
-  /// A submap that was given away.
+  /// Adds a submap that was handed over.
   void add(model::Submap submap) { waiting_.push_back({std::move(submap), kNever}); }
-  /// The store has it, where the hash is that of what it was given.
+  /// The store confirms a submap; ignored unless its hash is that of the submap sent.
   void confirm(const model::SubmapStored& stored);
-  /// Whether a store keeps up: few wait.
+  /// Whether a store keeps up: fewer than kMostWaiting submaps are unconfirmed.
   bool may_hand_over() const { return waiting_.size() < kMostWaiting; }
   /// Number of submaps that no store has confirmed.
   std::size_t waiting() const { return waiting_.size(); }
 
   /// The submaps to send now.
   std::vector<model::Submap> due(model::Utime now);
-  /// Takes a wanted submap out of those that wait; the store may have it or not.
+  /// Removes a requested submap from the unconfirmed ones and returns it; the store may have it or
+  /// not.
   std::optional<model::Submap> take(std::uint32_t map_id, model::SubmapId id);
-  /// Those of the wanted ones to ask for now.
+  /// The requested submaps whose query is to be sent now.
   std::vector<model::SubmapId> to_ask(std::span<const model::SubmapId> wanted, model::Utime now);
 
   /// Members of a saved state; see common/state.
@@ -53,17 +54,17 @@ class HandOver {
       a(s.submap, s.sent);
     }
   };
-  std::vector<Waiting> waiting_;                   ///< In the order in which they were given away.
-  std::map<model::SubmapId, model::Utime> asked_;  ///< When, of those that are wanted.
+  std::vector<Waiting> waiting_;                   ///< In the order of hand-over.
+  std::map<model::SubmapId, model::Utime> asked_;  ///< Time of the last query per requested submap.
 };
 
-/// When the poses of submaps are sent again: MAP_CORRECTION is their whole state.
+/// Decides when the poses of submaps are sent: MAP_CORRECTION carries the poses of all submaps.
 class CorrectionWatch {
  public:
-  /// Whether it is time to look at them.
+  /// Whether the poses are to be compared now.
   bool is_due(model::Utime now) const;
-  /// The message, where a pose has moved or is new since the last one; `is_last`: by any distance,
-  /// else by what matters to who reads the map.
+  /// The message, if a pose is new or has moved since the last message; `is_last`: by any distance,
+  /// else by at least 0.05 m.
   std::optional<model::MapCorrection> next(model::Utime now, std::uint32_t map_id,
                                            std::vector<model::SubmapPose> poses, bool is_last);
 

@@ -6,7 +6,7 @@
 namespace understory::geoslam_mapper {
 namespace {
 
-/// So many keyframes are in doubt after a loop closure that contradicts the graph.
+/// Number of keyframes in doubt after a loop closure that contradicts the graph.
 constexpr int kDoubtfulKeyframes = 50;
 
 }  // namespace

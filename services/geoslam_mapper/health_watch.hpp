@@ -1,4 +1,4 @@
-// What HEALTH says of the mapper beside faults of single messages.
+// HEALTH of the mapper, beside faults of single messages.
 #pragma once
 
 #include <array>
@@ -13,10 +13,11 @@
 
 namespace understory::geoslam_mapper {
 
-/// When the mapper is not well. Ranges and meanings: describe().
+/// Limits of the mapper's health conditions. Ranges and meanings: describe().
 struct HealthParameters {
-  double innovation_sigmas = 4.0;      ///< Of a keyframe's chi^2, as a normal deviate.
-  double filter_disagreement_m = 0.5;  ///< Between two keyframes' motion and the filter's.
+  double innovation_sigmas = 4.0;  ///< Of a keyframe's chi^2, as a normal deviate.
+  double filter_disagreement_m =
+      0.5;  ///< Between the motions of two keyframes in the map and in the filter.
   bus::ConditionLimits lost{8, 4};
   bus::ConditionLimits rolled_back{8, 2};
   bus::ConditionLimits diverged{8, 3};
@@ -27,7 +28,7 @@ struct HealthParameters {
 /// Adds the parameters to the table.
 void describe(HealthParameters& parameters, bus::ParameterTable& table);
 
-/// The last keyframe with a certain pose.
+/// The last keyframe that was localised.
 struct CertainKeyframe {
   model::Utime utime = 0;
   geometry::SE2 map_T_vehicle;
@@ -38,33 +39,33 @@ struct CertainKeyframe {
   }
 };
 
-/// Judges the mapper by its latest keyframes. `lost`: none has a certain pose. `rolled_back`: they
-/// contradict the map. `diverged`: they fit it worse than is stated (of a map as stated one
-/// keyframe in 1000 by chance, 3 of 8 once in 10^7), or the map moved otherwise than the filter,
-/// which uses the same detections, or a loop closure contradicts the graph and waits, or the graph
-/// has yielded to some (for 50 keyframes). `lost` as well where few landmarks match, no other place
-/// is found and odometry alone places keyframes, or scans without end. `input_refused`: they are
-/// malformed or late. `new_map`: another map was begun some keyframes ago. `not_stored`: no store
-/// has confirmed what the mapper gave away.
+/// Derives the mapper's health from its latest keyframes. `lost`: no keyframe is localised; also:
+/// few landmarks match, place recognition finds no other place, and only odometry places keyframes,
+/// or scans for long. `rolled_back`: keyframes contradict the map. `diverged`: they fit the map
+/// worse than stated (if the map is as stated: one keyframe in 1000 by chance, 3 of 8 once in
+/// 10^7); or the motion in the map differs from the filter's, which uses the same detections; or a
+/// loop closure contradicts the graph and waits, or has overruled the graph (for 50 keyframes).
+/// `input_refused`: keyframes are malformed or late. `new_map`: another map was begun some
+/// keyframes ago. `not_stored`: no store confirms submaps that were handed over.
 class HealthWatch {
  public:
-  /// All is well so far.
+  /// No condition is raised.
   explicit HealthWatch(const HealthParameters& parameters = {});
 
-  /// A map was given: until a keyframe is found in it, the first one without a certain pose is
-  /// enough for `lost`.
+  /// A map was given: until a keyframe is localised in it, a single keyframe that is not localised
+  /// raises `lost`.
   void must_find_map() { must_find_map_ = true; }
-  /// What became of a keyframe.
+  /// The result of a keyframe.
   void add(const model::MapUpdate& update);
-  /// A scan between keyframes: whether odometry alone gave its pose.
+  /// A scan between keyframes; `is_coasting`: only odometry gave its pose.
   void add_scan(bool is_coasting) { coasting_.condition.add(is_coasting); }
-  /// What became of a loop closure.
+  /// The result of a loop closure.
   void add(const model::LoopResult& result);
   /// The filter's pose, to compare motions.
   void add(const model::EkfPose& pose) { filter_.add(pose); }
-  /// Whether what the mapper gave away is kept by a store; to be called after each keyframe.
+  /// Whether a store confirms the submaps; call it after each keyframe.
   void keeps_up(bool does) { not_stored_.condition.add(!does); }
-  /// What to show.
+  /// The conditions for HEALTH.
   std::array<bus::WatchedCondition, 10> conditions() const {
     return {lost_,    unconfirmed_, rolled_back_, diverged_,   contradicts_,
             closure_, refused_,     new_map_,     not_stored_, coasting_};
@@ -97,7 +98,8 @@ class HealthWatch {
   std::optional<CertainKeyframe> last_;
   std::uint32_t map_id_ = 0;  ///< 0 before the first keyframe.
   bool must_find_map_ = false;
-  int doubtful_keyframes_ = 0;  ///< To come, since a loop closure contradicted the graph.
+  int doubtful_keyframes_ =
+      0;  ///< Number of keyframes to come, after a loop closure contradicted the graph.
 };
 
 }  // namespace understory::geoslam_mapper

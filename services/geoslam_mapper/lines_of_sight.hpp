@@ -1,4 +1,4 @@
-// Whether what a keyframe should have seen was hidden, or is not there.
+// Lines of sight: whether an expected landmark was occluded or its place was seen empty.
 #pragma once
 
 #include <deque>
@@ -11,15 +11,15 @@
 
 namespace understory::geoslam_mapper {
 
-/// Keeps VIEW_RANGES of the last sweeps until the keyframe comes that was made of them.
+/// Keeps VIEW_RANGES of the last sweeps until the keyframe of these sweeps arrives.
 class LinesOfSight {
  public:
-  /// The next sweep's.
+  /// Adds the next sweep's ranges.
   void add(const model::ViewRanges& ranges);
 
-  /// Fills in what the keyframe's scans measured along the rays to what they should have seen. One
-  /// is blocked, or clear, where half of the scans with ranges say so and none says the opposite.
-  /// `landmarks`: of the map, in order of id.
+  /// Sets the line of sight of each landmark that the keyframe expected: blocked or clear if half
+  /// of the scans with ranges say so and none says the opposite. `landmarks`: of the map, in order
+  /// of id.
   void fill(const model::Keyframe& keyframe, std::span<const model::MapLandmark> landmarks,
             model::MapUpdate& update) const;
 
@@ -32,7 +32,7 @@ class LinesOfSight {
  private:
   static constexpr std::size_t kKept = 32;  ///< Sweeps; a keyframe is made of 8 or fewer.
 
-  std::deque<model::ViewRanges> ranges_;  ///< In the order in which they came.
+  std::deque<model::ViewRanges> ranges_;  ///< In order of arrival.
 };
 
 }  // namespace understory::geoslam_mapper

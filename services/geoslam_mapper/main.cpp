@@ -1,4 +1,4 @@
-// The mapper as a process. Its channels: MapperChannels in adapter.hpp, and --help.
+// The mapper's process. Its channels: MapperChannels in adapter.hpp, and --help.
 #include "services/geoslam_mapper/adapter.hpp"
 
 int main(int argc, char** argv) {

@@ -12,7 +12,7 @@ constexpr double kMovedSigmas = 0.25;
 constexpr double kMostAround_m = 0.02;
 constexpr double kMostFarAway_m = 0.10;
 
-/// Whether a subscriber that has `told` must hear of `now`.
+/// Whether a subscriber that has `told` needs `now`.
 bool has_moved(const model::MapLandmark& told, const model::MapLandmark& now,
                const MapTolerance& tolerance) {
   const bool is_around = (now.position_m - tolerance.vehicle_m).norm() < kAroundVehicle_m;
@@ -22,7 +22,7 @@ bool has_moved(const model::MapLandmark& told, const model::MapLandmark& now,
   return (told.position_m - now.position_m).norm() > std::max(tolerance.moved_m, most_m);
 }
 
-/// In a list in order of id, the first that is not below `id`.
+/// The first element with an id not below `id`, in a list in order of id.
 template <class Landmarks>
 auto first_not_below(Landmarks& landmarks, model::LandmarkId id) {
   return std::lower_bound(

@@ -1,11 +1,11 @@
-// Parameters of the mapper. What each one does, with range and default, is documented
-// once: in adapter_parameters.cpp, which `understory-geoslam-mapper --help` prints. Here stand the
-// units that a name does not give.
+// Parameters of the mapper. Meaning, range and default of each are documented once: in
+// adapter_parameters.cpp, which `understory-geoslam-mapper --help` prints. The comments here give
+// units that are not in the name.
 #pragma once
 
 namespace understory::geoslam_mapper {
 
-/// Of incremental smoothing with covariances.
+/// Parameters of incremental smoothing with covariances.
 struct SmoothingMapperParameters {
   // Evidence.
   bool use_odometry = false;

@@ -1,4 +1,4 @@
-// What a frame's uncertainty is worth at a point of it.
+// Covariance of a point that follows from the uncertainty of a frame.
 #pragma once
 
 #include <Eigen/Core>

@@ -94,7 +94,7 @@ void JumpWatch::add(const model::Keyframe& keyframe, const model::MapUpdate& upd
   predicted_ = update.map_T_vehicle;
 }
 
-/// No motion leads from one map's frame to the other's.
+/// The motion from one map's frame to the other's is unknown.
 void JumpWatch::begin_map(std::uint32_t map_id) {
   if (map_id_ != 0) {
     ++count_;

@@ -1,4 +1,4 @@
-// What the mapper's poses need beyond the stage: a pose for each scan, the odometry frame, jumps.
+// Additions to the mapper's poses: a pose for each scan, the odometry frame, jumps.
 #pragma once
 
 #include <deque>
@@ -17,8 +17,8 @@ class OdometryFrame {
  public:
   /// Adds an increment, in order of time.
   void add(const model::Odometry& motion);
-  /// Pose at the newest stamp not after `utime`; the oldest one known before that, and identity
-  /// before the first.
+  /// Pose at the newest stamp not after `utime`; before the oldest stamp kept, the oldest pose;
+  /// identity before the first.
   geometry::SE2 odom_T_vehicle(model::Utime utime) const;
 
   /// Members of a saved state; see common/state.
@@ -46,36 +46,35 @@ class OdometryFrame {
 std::vector<model::SlamPose> poses_of(const model::Keyframe& keyframe,
                                       const model::MapUpdate& update);
 
-/// Fills in what the keyframe's detections are, where it has a place.
+/// Sets the landmark ids of the keyframe's detections, if it was localised.
 void identify_detections(const model::Keyframe& keyframe, model::MapUpdate& update);
 
-/// With what a mapper begins whose saved state is lost.
+/// First numbers of a mapper whose saved state is lost.
 struct NumbersAfterLoss {
   std::uint32_t map_id =
-      0;  ///< 1000 to 30,999: maps of before count from 1, and 32767 is the last.
-  std::uint64_t resets = 0;  ///< Poses count from here.
+      0;  ///< 1000 to 30,999: earlier maps count from 1, and 32767 is the largest.
+  std::uint64_t resets = 0;  ///< First value of `reset_counter`.
 };
-/// Others still know the maps of before: the next one has a number that none of them had, and
-/// `reset_counter` grows. `written_s`: when the lost state was written [s since 1970]; fewer maps
-/// and jumps come in a drive than seconds.
+/// Numbers that no earlier map and no earlier jump had, since other processes may still use them.
+/// `written_s`: time at which the lost state was written [s since 1970]; a drive has fewer maps and
+/// jumps than seconds.
 NumbersAfterLoss numbers_after_loss(std::int64_t written_s);
 
-/// Notices jumps of the keyframes' poses against what the keyframer tracked, and changes of the
-/// map.
+/// Detects jumps of the keyframes' poses against the keyframer's tracking, and changes of the map.
 class JumpWatch {
  public:
   /// A pose that differs from the tracked one by more than `distance_m` or `angle_rad` is a jump.
   explicit JumpWatch(double distance_m = 0.5, double angle_rad = 0.05)
       : distance_m_(distance_m), angle_rad_(angle_rad) {}
 
-  /// The next keyframe and what became of it.
+  /// Adds the next keyframe and its result.
   void add(const model::Keyframe& keyframe, const model::MapUpdate& update);
-  /// Goes on behind so many jumps of a process whose state is lost.
+  /// Continues counting after the `count` jumps of a process whose state is lost.
   void begin_behind(std::uint64_t count) { count_ = count; }
   /// Number of jumps so far.
   std::uint64_t count() const { return count_; }
-  /// The last jump: tracked_T_new of the vehicle; identity where it was a change of the map, of
-  /// which nothing is known.
+  /// The last jump: tracked_T_new of the vehicle; identity after a change of the map, where the
+  /// motion between the frames is unknown.
   const geometry::SE2& delta() const { return delta_; }
 
   /// Members of a saved state; see common/state. The limits are configuration.
@@ -89,7 +88,7 @@ class JumpWatch {
 
   double distance_m_;
   double angle_rad_;
-  /// map_T_base by tracking; none before the first, and where tracking broke off.
+  /// map_T_base by tracking; none before the first keyframe, and after an interruption of tracking.
   std::optional<geometry::SE2> predicted_;
   std::uint64_t count_ = 0;
   geometry::SE2 delta_;

@@ -33,7 +33,7 @@ PoseStream::OfKeyframe PoseStream::on_keyframe(const model::Keyframe& keyframe,
       counted_utime_ = pose.utime;
       ++result.counted;
     }
-    // Keyframes may share scans; the stamp always grows.
+    // Keyframes may share scans; the published stamp always grows.
     const bool is_stale = newest_scan_us_ - pose.utime > oldest_us;
     if (pose.utime <= newest_utime_ || is_stale) continue;
     pose.is_new_map = is_new_map;

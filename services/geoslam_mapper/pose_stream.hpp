@@ -1,5 +1,4 @@
-// SLAM_POSE: a pose for each scan, in order of time, whether its keyframe has
-// come or not.
+// SLAM_POSE: one pose per scan, in order of time, before or with its keyframe.
 #pragma once
 
 #include <cstdint>
@@ -12,53 +11,50 @@
 
 namespace understory::geoslam_mapper {
 
-/// Makes the poses that are published: none twice, none older than the last
-/// one, each with the odometry's frame, the jumps so far and the covariance of
-/// a given map's frame.
+/// Makes the poses to publish: each stamp once, never older than the last one, with the odometry
+/// frame, the number of jumps and the covariance of a given map's frame.
 class PoseStream {
  public:
-  /// What is told of a jump, and which poses are stale; see
-  /// describe(MapperOutputParameters&).
+  /// Limits for jumps and for stale poses; see describe(MapperOutputParameters&).
   struct Limits {
     double reset_distance_m = 0.5;
     double reset_angle_rad = 0.05;
     double oldest_pose_s = 0.05;
   };
 
-  /// No pose so far, and no map that was given.
+  /// No pose and no given map yet.
   explicit PoseStream(const Limits& limits)
       : limits_(limits), jumps_(limits.reset_distance_m, limits.reset_angle_rad) {}
 
   /// A map was given.
   void begin_in(const model::WholeMap& map) { given_frame_ = GivenFrame(map); }
-  /// Goes on behind so many jumps of a process whose state is lost.
+  /// Continues counting after the jumps of a process whose state is lost.
   void begin_behind(std::uint64_t resets) { jumps_.begin_behind(resets); }
   /// To be called after a load.
   void rebuild() { given_frame_.rebuild(); }
 
-  /// Motion; poses are given in its frame, too.
+  /// Adds an increment; the poses contain the sum of increments, too.
   void on_odometry(const model::Odometry& motion) { odometry_.add(motion); }
-  /// A scan between keyframes and what locate() gave for it: its pose, where it
-  /// is the newest. `map_id`: of the map in use, 0 where there is none yet.
+  /// A scan between keyframes and the result of locate(): its pose, if it is the newest. `map_id`:
+  /// of the map in use, 0 before the first.
   std::optional<model::SlamPose> on_scan(const model::LandmarkScan& scan,
                                          const std::optional<ScanPose>& found,
                                          std::uint32_t map_id);
-  /// A keyframe and what became of it.
+  /// The outputs of a keyframe.
   struct OfKeyframe {
     std::vector<model::SlamPose> poses;  ///< To be published, in this order.
-    /// Scans whose pose counts in the budget of MAP from now on. Each counts
-    /// once and with its keyframe, whether its pose was published then or
-    /// before: scans are not in the journal, and the budget shall be the same
-    /// after a restart.
+    /// Number of scans that this keyframe adds to the budget of MAP. Each scan counts once, with
+    /// its keyframe, even if its pose was published before: scans are not in the journal, and the
+    /// budget must be the same after a restart.
     std::size_t counted = 0;
   };
-  /// `is_new_map`: it began another map than the last one's. The scans of a
-  /// keyframe that began a map, or found a lost vehicle, are the past.
+  /// Adds a keyframe and its result. `is_new_map`: it began another map than the last one's. Scans
+  /// of a keyframe that began a map, or localised a lost vehicle, get no pose: they are in the
+  /// past.
   OfKeyframe on_keyframe(const model::Keyframe& keyframe, const model::MapUpdate& update,
                          bool is_new_map);
 
-  /// What is not known of the given map's frame there; nothing where the
-  /// vehicle left that map.
+  /// Covariance of the given map's frame at the pose; zero if the map in use is another one.
   Eigen::Matrix3d given_covariance_at(const geometry::SE2& map_T_vehicle,
                                       std::uint32_t map_id) const;
 
@@ -77,9 +73,9 @@ class PoseStream {
   OdometryFrame odometry_;
   JumpWatch jumps_;
   GivenFrame given_frame_;
-  bool is_provisional_ = false;       ///< The map, by its last keyframe.
-  model::Utime newest_utime_ = -1;    ///< Of a published pose.
-  model::Utime counted_utime_ = -1;   ///< Poses up to it are counted.
+  bool is_provisional_ = false;       ///< The map at its last keyframe.
+  model::Utime newest_utime_ = -1;    ///< Of the newest published pose.
+  model::Utime counted_utime_ = -1;   ///< Poses up to this stamp are counted.
   model::Utime newest_scan_us_ = -1;  ///< Not saved: scans are not in the journal.
 };
 

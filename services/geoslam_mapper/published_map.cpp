@@ -36,7 +36,7 @@ std::optional<model::MapDelta> PublishedMap::on_update(
   if (update.status == model::MapUpdateStatus::kFirstMap ||
       update.status == model::MapUpdateStatus::kUpdated) {
     ++keyframes_;
-    is_sent_ = false;  // Landmarks moved, if by less than the tolerance.
+    is_sent_ = false;  // Landmarks moved, even if by less than the tolerance.
   }
   const bool changes = !delta.added.empty() || !delta.moved.empty() || !delta.removed.empty() ||
                        !delta.merged.empty();
@@ -44,7 +44,7 @@ std::optional<model::MapDelta> PublishedMap::on_update(
   set_covariances(delta.added);
   set_covariances(delta.moved);
 
-  // Another map builds on nothing; versions are never used again.
+  // The delta of another map has no base; versions are never reused.
   delta.base_version = begins_another ? 0 : version_;
   delta.version = ++version_;
   must_send_ |=

@@ -1,4 +1,4 @@
-// The map as its subscribers have it, and when they are sent which part of it.
+// The map as published: versions, and when MAP and MAP_DELTA are sent.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,12 @@
 
 namespace understory::geoslam_mapper {
 
-/// Numbers the versions of the map and decides when MAP is sent without a
-/// request: at once where another map begins, soon where the map starts or
-/// jumps as a whole, else within the budget. A pure function of the keyframes
-/// and of the bytes that were sent.
+/// Numbers the versions of the map and decides when MAP is sent without a request: at once if
+/// another map begins, soon after a start or a jump of the whole map, else within the budget. A
+/// pure function of the keyframes and of the bytes sent.
 class PublishedMap {
  public:
-  /// Limits of what is told; ranges and meanings:
-  /// describe(MapperOutputParameters&).
+  /// Limits of the outputs; ranges and meanings: describe(MapperOutputParameters&).
   struct Limits {
     double moved_m = 0.001;
     double reset_distance_m = 0.5;
@@ -34,7 +32,7 @@ class PublishedMap {
   std::uint32_t map_id() const { return map_id_; }
   /// Stamp of the newest keyframe.
   model::Utime utime() const { return utime_; }
-  /// What a subscriber of every MAP_DELTA has, in order of id.
+  /// Landmarks as a subscriber of every MAP_DELTA has them, in order of id.
   const std::vector<model::MapLandmark>& landmarks() const { return landmarks_; }
   /// Whether a keyframe began another map than the last one's.
   bool is_another(const model::MapUpdate& update) const {
@@ -43,29 +41,28 @@ class PublishedMap {
 
   /// The mapper starts with these landmarks, in order of id and at least one.
   void begin_with(std::vector<model::MapLandmark> landmarks);
-  /// Puts the covariances into landmarks of the map as it is.
+  /// Sets the covariances of landmarks of the present map.
   using SetCovariances = std::function<void(std::span<model::MapLandmark>)>;
-  /// The next keyframe: what the subscribers must be told of it, if anything.
-  /// `changed`: landmarks that are new, have moved or are around the vehicle,
-  /// in order of id, without covariances. O(changed * log(map)).
+  /// Adds the next keyframe; returns the change to publish, if any. `changed`: landmarks that are
+  /// new, have moved or are around the vehicle, in order of id, without covariances. O(changed *
+  /// log(map)).
   std::optional<model::MapDelta> on_update(const model::MapUpdate& update,
                                            const std::vector<model::MapLandmark>& changed,
                                            const SetCovariances& set_covariances);
-  /// The mapper gave a submap away: it changes no more, and nobody is told that
-  /// it went. O(map).
+  /// The mapper handed a submap over: it no longer changes, and subscribers keep it. O(map).
   void give_away(const model::Submap& submap);
-  /// The mapper has that submap again.
+  /// The mapper has loaded that submap again.
   void take_back(const model::Submap& submap) { keyframes_ += submap.keyframes.size(); }
 
-  /// Bytes that were sent on other channels.
+  /// Adds bytes that were sent on other channels.
   void earn(std::size_t bytes) { budget_.earn(bytes); }
-  /// Whether the map has changed since MAP was sent.
+  /// Whether the map has changed since the last MAP.
   bool has_changed() const { return !is_sent_; }
   /// Whether MAP is to be sent now, without a request.
   bool is_due() const;
-  /// MAP was sent without a request, with so many bytes.
+  /// A MAP of this size was sent without a request.
   void sent(std::size_t bytes);
-  /// The message for MAP, with what the mapper has.
+  /// The message for MAP, from the mapper's landmarks and keyframes.
   model::WholeMap whole(std::vector<model::MapLandmark> landmarks,
                         std::vector<model::KeyframePose> keyframes) const;
 
@@ -84,11 +81,11 @@ class PublishedMap {
   std::uint32_t map_id_ = 0;
   std::vector<model::MapLandmark> landmarks_;
   bool is_sent_ = true;
-  bool must_send_ = false;  ///< It started or jumped since it was last sent.
+  bool must_send_ = false;  ///< It started or jumped since the last MAP.
   std::uint64_t keyframes_ = 0;
 };
 
-/// Bytes of a MAP with so many parts.
+/// Size of a MAP with these numbers of landmarks and keyframes [bytes].
 std::size_t map_bytes(std::size_t landmarks, std::size_t keyframes);
 
 }  // namespace understory::geoslam_mapper

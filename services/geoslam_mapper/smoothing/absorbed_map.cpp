@@ -8,19 +8,19 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Path [m] between the end of the other map and the beginning of this one: all of it is an earlier
-/// pass.
+/// Path length [m] between the end of the other map and the beginning of this one: the whole other
+/// map becomes an earlier pass.
 constexpr double kBefore_m = 1000.0;
-/// What the motion between the two is known to until they are joined [m], [rad].
+/// Sigma of the motion between the two until they are joined [m], [rad].
 constexpr double kLooseSigma_m = 10.0;
 constexpr double kLooseSigma_rad = 0.3;
 
-/// Path [m] at the newest node of a map that has one.
+/// Path length [m] at the newest node of a map that has one.
 double driven_m(const PoseGraph& graph) {
   return graph.newest() ? graph.node(*graph.newest()).along_m : 0.0;
 }
 
-/// What was given is observed from a node of its own, the origin of its map.
+/// Given landmarks count as observed from a new node at the origin of their map.
 std::optional<NodeIndex> observe_given(const LandmarkMap& landmarks, double along_m,
                                        LooseGraph& loose) {
   const auto origin = static_cast<NodeIndex>(loose.nodes.size());
@@ -43,7 +43,7 @@ std::optional<NodeIndex> observe_given(const LandmarkMap& landmarks, double alon
   return origin;
 }
 
-/// The node of the other map that is nearest to where the vehicle is now.
+/// The node of the other map that is nearest to the vehicle.
 NodeIndex nearest_to(const Eigen::Vector2d& here_m, const LooseGraph& loose) {
   NodeIndex nearest = 0;
   double least_m = std::numeric_limits<double>::infinity();
@@ -78,7 +78,7 @@ std::vector<model::LandmarkId> absorb(GlobalMap other, const geometry::SE2& map_
   map.graph.add_closure(kAbsorbing, first + near, newest,
                         loosely(loose.nodes[near].pose.inverse() * other_T_newest));
 
-  // What is known of its landmarks and keyframes.
+  // Data of its landmarks and keyframes.
   std::vector<model::LandmarkId> ids;
   for (StoredLandmark landmark : other.landmarks.release()) {
     for (NodeIndex& node : landmark.nodes) node += first;

@@ -1,4 +1,4 @@
-// A graph that becomes part of another one.
+// Absorbs a graph into another one.
 #include <algorithm>
 #include <set>
 
@@ -47,7 +47,7 @@ LooseGraph PoseGraph::loosened() {
   return loose;
 }
 
-/// As a motion of its two nodes alone.
+/// The motion, reduced to its two nodes.
 FrozenMotion PoseGraph::loose_motion(MotionRef ref) const {
   if (ref.is_biased) {
     const plane::BiasedRelativePose& biased = smoother_.motion(plane::BiasedMotionId(ref.number));
@@ -61,7 +61,7 @@ FrozenMotion PoseGraph::loose_motion(MotionRef ref) const {
   return motion;
 }
 
-/// What stands for landmarks that are away, likewise.
+/// The motion that represents stored landmarks, likewise.
 FrozenMotion PoseGraph::away_motion(const TiedNodes& nodes, const Tie& tie) {
   return {nodes.first, nodes.second, tie.away.a_T_b, tie.away.information, tie.submaps, 0};
 }
@@ -73,7 +73,7 @@ std::vector<FrozenMotion> PoseGraph::motions_of(NodeIndex node) const {
   return motions;
 }
 
-/// Each once; those that are frozen, too.
+/// All motions, each once, including frozen ones.
 std::vector<FrozenMotion> PoseGraph::loose_motions() const {
   std::vector<FrozenMotion> motions = frozen_motions_.all();
   for (NodeIndex node = 0; node < nodes_.size(); ++node) {
@@ -126,7 +126,7 @@ NodeIndex PoseGraph::absorb(const LooseGraph& other, const geometry::SE2& map_T_
   return first;
 }
 
-/// What stands for landmarks that are kept elsewhere stays as it is.
+/// A motion that represents stored landmarks is added as it is.
 void PoseGraph::absorb(const FrozenMotion& motion, NodeIndex first) {
   const NodeIndex a = first + motion.a;
   const NodeIndex b = first + motion.b;

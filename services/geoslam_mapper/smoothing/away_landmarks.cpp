@@ -1,4 +1,4 @@
-// Landmarks out of the graph: what they measure of the nodes, as motions that stay.
+// Stored landmarks: their information on the nodes stays in the graph as motions.
 #include <algorithm>
 #include <map>
 #include <stdexcept>
@@ -15,7 +15,8 @@ AwayLandmarks PoseGraph::put_away(std::span<const model::LandmarkId> ids) {
     for (const TiedNodes& nodes : tied_by(id)) tied[nodes].push_back(id);
   }
 
-  // Of each tie what they tell; with those that stay it is what the graph has.
+  // For each tie the motion of these landmarks; with the remaining ones it sums up to the graph's
+  // motion.
   AwayLandmarks away;
   away.ties.reserve(tied.size());
   for (const auto& [nodes, theirs] : tied) {
@@ -59,7 +60,7 @@ void PoseGraph::bring_back(std::span<const model::LandmarkId> ids, const AwayLan
     take_away_out(one);
     stood_for.emplace(one.a, one.b);
   }
-  std::set<TiedNodes> changed;  // None, where the payload is what the graph gave away.
+  std::set<TiedNodes> changed;  // Empty, if the payload is unchanged.
   for (std::size_t i = 0; i < ids.size(); ++i) {
     dormant_.emplace(ids[i], away.observed[i]);
     for (const DormantObservation& one : away.observed[i]) {
@@ -75,8 +76,8 @@ void PoseGraph::bring_back(std::span<const model::LandmarkId> ids, const AwayLan
   renew(changed);
 }
 
-/// Each two nodes that lie near each other have landmarks in common that are parts of several
-/// submaps: one motion of them is what a long drive has room for. The graph's motion stays.
+/// Two nodes near each other share landmarks of several submaps: memory on a long drive allows one
+/// motion for all of them. The graph's motion stays.
 void PoseGraph::add_away(const FrozenMotion& motion) {
   Tie& tie = ties_[{motion.a, motion.b}];
   const MeasuredMotion fresh{motion.a_T_b, motion.information};

@@ -1,4 +1,4 @@
-// What odometry measured between the centres of two keyframes.
+// Odometry between the centres of two keyframes.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// The gyro's bias as a stop shows it.
+/// The gyro's bias as measured while the vehicle was stationary.
 struct MeasuredBias {
   double bias = 0.0;      ///< [rad/s]
   double variance = 0.0;  ///< [(rad/s)^2]
@@ -19,11 +19,11 @@ struct CentreMotion {
   NodeIndex from = 0;
   model::Utime utime = 0;                 ///< Of the later keyframe's base.
   geometry::SE2WithCovariance from_T_to;  ///< Right perturbation.
-  /// The same rotation by the gyro alone. None without an IMU, and while the vehicle was
+  /// The same rotation from the gyro alone. None without an IMU, and while the vehicle was
   /// stationary.
   std::optional<model::GyroRotation> gyro;
-  double odometry_bias = 0.0;  ///< That odometry takes out of the gyro's rate at present [rad/s].
-  /// By the stops since the last such motion; none where there was none.
+  double odometry_bias = 0.0;  ///< Bias that odometry now subtracts from the gyro's rate [rad/s].
+  /// From the stops since the last such motion; none without a stop.
   std::optional<MeasuredBias> at_stops;
 };
 

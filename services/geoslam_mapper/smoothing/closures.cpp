@@ -9,13 +9,13 @@ namespace {
 
 /// Squared Mahalanobis distance (3 degrees of freedom) that chance exceeds once in 10^6.
 constexpr double kConsistent = 30.7;
-/// Where closures contradict the graph, its variances may be understated by so much at most: the
-/// short paths from one closure to the next are not believed more than the long one.
+/// Largest ratio by which closures may show the graph's variances to be understated when they are
+/// compared: the short paths between closures are not trusted more than the long one.
 constexpr double kMostMisstated = 100.0;
-/// Two closures prove something together where the graph ties them to so much [m], as one standard
-/// deviation: where it hardly does, any two agree.
+/// Two closures can support each other only if the graph ties them to within this standard
+/// deviation [m]: with a looser tie any two agree.
 constexpr double kMostSpread_m = 2.0;
-/// Rounds of the graph for a large correction.
+/// Iterations of the graph for a large correction.
 constexpr int kClosureRounds = 20;
 
 double squared_distance(const geometry::SE2WithCovariance& a,
@@ -24,12 +24,12 @@ double squared_distance(const geometry::SE2WithCovariance& a,
   return off.dot((a.covariance + b.covariance).inverse() * off);
 }
 
-/// Where closures that agree contradict the graph, the variances on the path between their ends are
-/// raised, to so many times those stated in all: standard deviations of a thirtieth. An odometry
-/// that is worse is a fault, and closures that ask for more are wrong.
+/// Largest factor by which agreeing closures may raise the variances on the path between their
+/// ends, in total: standard deviations by 30. A worse odometry is faulty, and closures that need
+/// more are wrong.
 constexpr double kMostUnderstated = 1000.0;
 
-/// Solves until the closures fit, or nothing changes any more.
+/// Solves until the closures fit or the estimates no longer change.
 bool settles(std::span<const std::uint64_t> ids, PoseGraph& graph) {
   for (int round = 0; round < kClosureRounds; ++round) {
     if (!graph.solve().ok) return false;
@@ -68,7 +68,7 @@ Closures::Decision Closures::take(const model::LoopClosure& closure, const Closu
     return decision;
   }
 
-  // A witness against the graph.
+  // It contradicts the graph: it waits.
   if (waiting_.size() == kMostWaiting) waiting_.erase(waiting_.begin());
   waiting_.push_back(one);
   const std::vector<Waiting> agreeing = agreeing_with(one, map);
@@ -89,7 +89,7 @@ Closures::Decision Closures::take(const model::LoopClosure& closure, const Closu
   return decision;
 }
 
-/// What waits and is within what the graph knows by now counts.
+/// Accepts waiting closures that are now within the graph's uncertainty.
 void Closures::take_expected(GlobalMap& map) {
   const auto counts = [&](const Waiting& one) {
     const auto known = map.graph.relative(one.a, one.b);
@@ -99,7 +99,8 @@ void Closures::take_expected(GlobalMap& map) {
   }
 }
 
-/// The largest set of those that wait, the newest among them, in which all agree with each other.
+/// The largest set of waiting closures that includes the newest and in which all agree with each
+/// other.
 std::vector<Closures::Waiting> Closures::agreeing_with(const Waiting& one,
                                                        const GlobalMap& map) const {
   std::vector<std::uint64_t> agrees(waiting_.size());
@@ -118,8 +119,8 @@ std::vector<Closures::Waiting> Closures::agreeing_with(const Waiting& one,
   return set;
 }
 
-/// Whether the way a -> b -> other b -> other a -> a closes. Both say by how much the graph
-/// understates its variances; where they were raised already, that counts.
+/// Whether the loop a -> b -> other b -> other a -> a closes. Both give the graph's understatement;
+/// variances that were raised already count as raised.
 bool Closures::agree(const Waiting& one, const Waiting& other, const GlobalMap& map) const {
   const double misstatement = std::min(one.misstatement, other.misstatement);
   const auto between = [&](NodeIndex from, NodeIndex to) {
@@ -172,8 +173,8 @@ Closures::Stretch Closures::stretch_of(std::span<const Waiting> closures, const 
   return stretch;
 }
 
-/// Variances between the ends of the median closure over those that the graph states (3 degrees of
-/// freedom); none where the graph determines no ends.
+/// Ratio of the squared error at the median closure's ends to the variance that the graph states (3
+/// degrees of freedom); none if the graph leaves the ends undetermined.
 std::optional<double> Closures::median_ratio(std::span<const Waiting> closures,
                                              const GlobalMap& map) {
   std::vector<double> ratios;
@@ -187,9 +188,9 @@ std::optional<double> Closures::median_ratio(std::span<const Waiting> closures,
   return *middle;
 }
 
-/// Against the graph: what it states of the path between their ends is corrected where they do not
-/// fit otherwise. What was corrected before on a part of that path counts: the factors of nested
-/// loops do not multiply.
+/// Accepts closures against the graph: the variances of the path between their ends are raised if
+/// the closures do not fit otherwise. Earlier raises on a part of that path count: factors of
+/// nested loops are not multiplied.
 Closures::Decision Closures::overrule(std::span<const Waiting> closures, GlobalMap& map) {
   using enum model::LoopResult::Status;
   const Stretch stretch = stretch_of(closures, map);

@@ -1,4 +1,4 @@
-// Loop closures that other processes found, or persons set.
+// Loop closures from other processes or set by hand.
 #pragma once
 
 #include <optional>
@@ -19,32 +19,31 @@ struct ClosureEnd {
   geometry::SE2WithCovariance node_T_end;
 };
 
-/// Takes loop closures into the graph, and out again. One that is within what the graph knows of
-/// its ends counts at once. One that is not is a witness against the graph: it waits until the
-/// witnesses that agree with it are beyond doubt (witnesses.hpp), or a person says so. Then all of
-/// them count, and where the rest of the graph does not allow them, the variances of the path
-/// between their ends are raised by the ratio of what the witnesses show to what was stated, to
-/// 1000 times those stated at most. A set that does not fit even then is taken back exactly and
-/// goes on waiting. After each that counts, those that wait count, too, where the graph expects
-/// them by now.
+/// Adds loop closures to the graph and removes them. A closure within the graph's uncertainty of
+/// its ends is accepted at once. Another one contradicts the graph: it waits until enough
+/// consistent closures (witnesses.hpp) support it, or a person confirms it. Then all of them are
+/// accepted. If the rest of the graph does not allow them, the variances of the path between their
+/// ends are raised by the ratio of the observed to the stated error, at most to 1000 times those
+/// stated. A set that does not fit even then is rolled back exactly and waits on. After each
+/// acceptance, waiting closures that the graph now predicts are accepted, too.
 class Closures {
  public:
-  /// Closures that wait, at most: then the oldest is dropped.
+  /// Most closures that wait; beyond that the oldest is dropped.
   static constexpr std::size_t kMostWaiting = 32;
 
-  /// What became of one.
+  /// Result of one closure.
   struct Decision {
     model::LoopResult::Status status = model::LoopResult::Status::kRefused;
     std::string reason;
   };
-  /// Takes a closure with its ends, which may have been told before. Solves where it counts. Cost:
-  /// joint covariances of its ends and of the waiting ones; where it counts, an update of all
-  /// between them.
+  /// Adds a closure with its ends, possibly one that was received before. Solves the graph if it is
+  /// accepted. Cost: joint covariances of its ends and of the waiting ones; if accepted, an update
+  /// of the graph between its ends.
   Decision take(const model::LoopClosure& closure, const ClosureEnd& from, const ClosureEnd& to,
                 GlobalMap& map);
-  /// Takes a closure back.
+  /// Removes a closure again.
   Decision revoke(std::uint64_t id, GlobalMap& map);
-  /// Nodes are parts of others now: what waits follows them.
+  /// Nodes became parts of other nodes: moves the ends of waiting closures to these.
   void hand_over(std::span<const Retirement> retired);
 
   /// Members of a saved state; see common/state.
@@ -54,14 +53,14 @@ class Closures {
   }
 
  private:
-  /// A closure between two nodes that does not count yet.
+  /// A closure between two nodes that is not accepted yet.
   struct Waiting {
     std::uint64_t id = 0;
     NodeIndex a = 0;
     NodeIndex b = 0;
     geometry::SE2WithCovariance a_T_b;
     double log10_false_alarm = 0.0;
-    /// Variances between its ends over those that the graph states, as this closure has it.
+    /// Ratio of the variances between its ends by this closure to those that the graph states.
     double misstatement = 1.0;
 
     template <class Archive, class Self>

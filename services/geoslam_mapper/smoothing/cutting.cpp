@@ -31,7 +31,7 @@ double turn_of(std::span<const CutNode> nodes) {
   return std::abs(geometry::wrap_angle(nodes.back().heading_rad - before->heading_rad));
 }
 
-/// Whether a stretch that is long enough may end with the last of the nodes.
+/// Whether a stretch of sufficient length may end with the last of the nodes.
 bool may_end(std::span<const CutNode> nodes, const CutPolicy& policy) {
   if (policy.sparse <= 0.0 && policy.dense <= 0.0 && policy.turn_rad <= 0.0) return true;
   const auto mean = mean_landmarks(nodes);

@@ -37,7 +37,7 @@ std::vector<model::Association> Discovery::update(const model::Keyframe& keyfram
     const model::KeyframeLandmark& observed = keyframe.landmarks[i];
     const Eigen::Vector2d position = map_T_centre * observed.position_m;
 
-    // Its candidate, an old or a new one.
+    // The matching candidate, or a new one.
     Candidate* candidate = matching(position, observed);
     if (candidate == nullptr) {
       candidates_.push_back({position,
@@ -50,13 +50,13 @@ std::vector<model::Association> Discovery::update(const model::Keyframe& keyfram
     }
     if (!candidate->observations.empty() && candidate->observations.back().node == node) continue;
 
-    // One observation more.
+    // Adds the observation.
     candidate->observations.push_back({node, observed});
     candidate->observation_count += observed.observation_count;
     candidate->position_m = position;
     if (!is_confirmed(*candidate)) continue;
 
-    // Enough of them.
+    // Promotes a confirmed candidate.
     found.push_back({static_cast<std::uint32_t>(i), promote(*candidate, map)});
     candidates_.erase(candidates_.begin() + (candidate - candidates_.data()));
   }
@@ -64,7 +64,7 @@ std::vector<model::Association> Discovery::update(const model::Keyframe& keyfram
   return found;
 }
 
-/// Candidates where the graph has them now, and how often they should have been detected.
+/// Updates the candidates' positions from the graph, and their numbers of expected detections.
 void Discovery::follow(const model::Keyframe& keyframe, const geometry::SE2& centre_T_map,
                        const PoseGraph& graph) {
   for (Candidate& candidate : candidates_) {
@@ -74,8 +74,8 @@ void Discovery::follow(const model::Keyframe& keyframe, const geometry::SE2& cen
   }
 }
 
-/// Observed often enough, and in a fair share of the scans that had it in view: noise at the edge
-/// of the range, and clutter, are not.
+/// Observed often enough, and in a sufficient share of the scans with it in view: this excludes
+/// clutter and noise at the edge of the range.
 bool Discovery::is_confirmed(const Candidate& candidate) const {
   return candidate.observation_count >= static_cast<std::uint32_t>(parameters_.min_observations) &&
          candidate.observation_count >= parameters_.min_observation_ratio * candidate.times_in_view;
@@ -96,7 +96,7 @@ Discovery::Candidate* Discovery::matching(const Eigen::Vector2d& position_m,
 }
 
 model::LandmarkId Discovery::promote(const Candidate& candidate, GlobalMap& map) const {
-  // Its observations' mean.
+  // Mean of its observations.
   StoredLandmark landmark;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (const Candidate::Observation& observation : candidate.observations) {
@@ -113,7 +113,7 @@ model::LandmarkId Discovery::promote(const Candidate& candidate, GlobalMap& map)
   landmark.last_keyframe = map.trajectory.size();
   landmark.kind = candidate.kind;
 
-  // Into the map, then into the graph with all that was observed of it.
+  // Adds it to the map, then to the graph with all its observations.
   const model::LandmarkId id = map.landmarks.insert(landmark);
   map.graph.add_landmark(id, landmark.position_m, std::nullopt);
   for (const Candidate::Observation& observation : candidate.observations)

@@ -10,8 +10,8 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Collects landmarks that keyframes observed and the map does not have, until they are confirmed
-/// (in the place of GeoSLAM §4.3.4, algorithm 5).
+/// Collects landmarks that keyframes observed and the map does not contain, until they are
+/// confirmed (replaces GeoSLAM §4.3.4, algorithm 5).
 class Discovery {
  public:
   /// An empty list of candidates.
@@ -19,12 +19,12 @@ class Discovery {
 
   /// Every landmark of the keyframe without an association becomes a candidate, or a further
   /// observation of one. A candidate with enough observations enters the map with all of them, so
-  /// that nothing measured is lost. `keyframe` is in the frame of `node` and is in the trajectory
-  /// already. Returns the associations with the new landmarks.
+  /// no measurement is lost. `keyframe` is in the frame of `node` and already in the trajectory.
+  /// Returns the associations with the new landmarks.
   std::vector<model::Association> update(const model::Keyframe& keyframe, NodeIndex node,
                                          std::span<const model::Association> known, GlobalMap& map);
 
-  /// What a node that is taken out of the graph observed is in the frame of another one now.
+  /// A node leaves the graph: its observations of candidates move to the node that replaces it.
   void hand_over(const Retirement& retirement);
 
   /// Members of a saved state; see common/state.
@@ -34,7 +34,7 @@ class Discovery {
   }
 
  private:
-  /// Observed, but too seldom yet to be believed.
+  /// Observed, but not often enough to be confirmed.
   struct Candidate {
     struct Observation {
       NodeIndex node = 0;
@@ -47,8 +47,8 @@ class Discovery {
     };
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `map`.
     std::vector<Observation> observations;
-    std::uint32_t observation_count = 0;  ///< Scans that detected it.
-    std::uint32_t times_in_view = 0;      ///< Scans since the first that should have detected it.
+    std::uint32_t observation_count = 0;  ///< Number of scans that detected it.
+    std::uint32_t times_in_view = 0;      ///< Scans since the first with the candidate in view.
     std::uint32_t first_keyframe = 0;     ///< Number of accepted keyframes at its first one.
     model::LandmarkKind kind = model::LandmarkKind::kTrunk;
 

@@ -1,4 +1,4 @@
-// Landmarks out of the solved graph: what they measure of the nodes, as motions between these.
+// Dormant landmarks: their information on the nodes as motions between these.
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -15,10 +15,10 @@ namespace plane = factor_graph::plane;
 constexpr int kSteps = 2;
 /// Directions with less than this share of the largest information are undetermined.
 constexpr double kUndetermined = 1e-6;
-/// Distance [m] of landmarks from their node.
+/// Assumed distance [m] of landmarks from their node.
 constexpr double kLever_m = 40.0;
 
-/// The least solution where the information leaves directions undetermined.
+/// The minimum-norm solution if the information leaves directions undetermined.
 Eigen::Vector3d solution(const Eigen::Matrix3d& information, const Eigen::Vector3d& gradient) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
   Eigen::Vector3d inverse = Eigen::Vector3d::Zero();
@@ -30,7 +30,8 @@ Eigen::Vector3d solution(const Eigen::Matrix3d& information, const Eigen::Vector
          gradient;
 }
 
-/// One landmark's say on the motion between two nodes, all in the first one's frame but `z_b`.
+/// One landmark's measurement of the motion between two nodes, all in the first node's frame except
+/// `z_b`.
 struct Shared {
   Eigen::Vector2d z_a = Eigen::Vector2d::Zero();
   Eigen::Vector2d z_b = Eigen::Vector2d::Zero();
@@ -43,7 +44,7 @@ void PoseGraph::make_dormant(std::span<const model::LandmarkId> ids,
                              const std::map<model::LandmarkId, StoredLandmark>& landmarks) {
   std::set<TiedNodes> changed;
   for (const model::LandmarkId id : ids) {
-    // Its observations go.
+    // Removes its observations.
     std::vector<DormantObservation>& observed = dormant_[id];
     for (const NodeIndex node : landmarks.at(id).nodes) {
       const auto entry = nodes_[node].observations().find(id);
@@ -54,7 +55,7 @@ void PoseGraph::make_dormant(std::span<const model::LandmarkId> ids,
       dormant_of_node_[node].landmarks.push_back(id);
     }
 
-    // It goes itself.
+    // Removes the landmark itself.
     const auto point = point_of_.find(id);
     landmark_of_point_[index(point->second)] = 0;
     if (smoother_.is_free(point->second)) free_points_.give(index(point->second));
@@ -107,7 +108,7 @@ std::vector<PoseGraph::TiedNodes> PoseGraph::tied_by(model::LandmarkId id) const
   return result;
 }
 
-/// The motions of these ties after their landmarks changed.
+/// Recomputes the motions of these ties after their landmarks changed.
 void PoseGraph::renew(const std::set<TiedNodes>& ties) {
   for (const TiedNodes& nodes : ties) {
     const auto entry = ties_.find(nodes);
@@ -151,9 +152,8 @@ void PoseGraph::take_out(plane::MotionId motion) {
 }
 
 /// Eliminating a point that two nodes observed with information A and B leaves the difference of
-/// what they observed, with the weight A (A + B)^-1 B. Of a point that others observed, too, it
-/// counts with the share that A and B have in the sum of all: exact where informations are
-/// isotropic.
+/// the two observations, with weight A (A + B)^-1 B. For a point with more observers the weight is
+/// scaled by the share of A and B in the sum of all: exact for isotropic informations.
 plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
                                    std::span<const model::LandmarkId> ids) const {
   const auto& [a, b] = nodes;
@@ -199,14 +199,14 @@ plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
   return result;
 }
 
-/// The landmark is no more among the node's dormant ones.
+/// Removes the landmark from the node's dormant ones.
 void PoseGraph::wakes(NodeIndex node, model::LandmarkId id) {
   const auto found = dormant_of_node_.find(node);
   std::erase(found->second.landmarks, id);
   if (found->second.landmarks.empty()) dormant_of_node_.erase(found);
 }
 
-/// Whether the node's landmarks must follow it; they do then.
+/// Whether the node has moved so far that its dormant landmarks must follow; then records its pose.
 bool PoseGraph::has_left(NodeIndex node) {
   const auto found = dormant_of_node_.find(node);
   if (found == dormant_of_node_.end()) return false;
@@ -219,7 +219,7 @@ bool PoseGraph::has_left(NodeIndex node) {
   return true;
 }
 
-/// Where the nodes that observed it have it.
+/// Mean of the positions by its observers.
 Eigen::Vector2d PoseGraph::dormant_position(model::LandmarkId id) const {
   Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
   Eigen::Vector2d weighted = Eigen::Vector2d::Zero();

@@ -9,40 +9,40 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// So much likelier must one landmark be than two.
+/// Least odds of one landmark against two.
 constexpr double kLeastOdds = 30.0;
-/// Degrees of freedom of the error's distribution (Student's t): real landmarks have heavy tails.
+/// Degrees of freedom of the error's distribution (Student's t): errors of real landmarks have
+/// heavy tails.
 constexpr double kTail = 4.0;
-/// Share of the landmarks that bad scans put somewhere else for a while, and how much rarer that is
-/// with each further node that observed them.
+/// Share of the landmarks that bad scans displace temporarily, and its factor for each further node
+/// that observed the landmark.
 constexpr double kMoved = 0.05;
 constexpr double kMovedAgain = 0.8;
-/// Trunks stand in clumps: least density of others beside one [1/m^2]. Between 0.3 and 1 m it is
-/// 0.03 to 0.08 in surveyed forests (Longleaf, Lansing, Bei, Waka); 0.02 merged no more that are
-/// two than 0.05 did, and more that are one.
-/// Where who saw which tells them apart, too, less is enough.
+/// Trunks stand in clumps: least density of other trunks next to one [1/m^2]. Between 0.3 and 1 m
+/// it is 0.03 to 0.08 in surveyed forests (Longleaf, Lansing, Bei, Waka); 0.02 gave no more wrong
+/// merges than 0.05, and more correct ones.
+/// The sightings per node distinguish the two as well, so a lower density is sufficient.
 constexpr double kLeastDensity = 0.02;
 constexpr double kLeastDensityByTurns = 0.01;
-/// Where their distance is known worse than this [m^2, per axis], it tells no trunk of a clump from
-/// the next.
+/// Largest variance of the distance [m^2, per axis] that resolves the trunks of a clump.
 constexpr double kTellsTrunks_m2 = 0.0125;
-/// Observations on one way lie this near together on the vehicle's path [m].
+/// Observations within this path length [m] belong to one way past the landmark.
 constexpr double kOneWay_m = 15.0;
-/// A landmark or node that was seen last so long ago on the way [m] is of an earlier pass.
+/// A landmark or node last seen more than this path length ago [m] belongs to an earlier pass.
 constexpr double kEarlierPass_m = 50.0;
 constexpr double kNeighbourhood_m = 25.0;
-/// No two trunks stand nearer to each other, from centre to centre [m].
+/// Least distance of two trunks, from centre to centre [m].
 constexpr double kTouching_m = 0.06;
 
-/// Nodes that observed both.
+/// Number of nodes that observed both.
 std::ptrdiff_t count_together(const StoredLandmark& a, const StoredLandmark& b) {
   return std::count_if(a.views_m.begin(), a.views_m.end(), [&](float view_m) {
     return std::find(b.views_m.begin(), b.views_m.end(), view_m) != b.views_m.end();
   });
 }
 
-/// Whether nodes observed the two side by side. Two trunks that really are so near to each other
-/// are observed together from almost everywhere; one that a bad scan doubled is so once.
+/// Whether nodes observed the two side by side. Two separate trunks at this distance are observed
+/// together from almost everywhere; a trunk doubled by a bad scan is observed so once.
 bool are_observed_together(const StoredLandmark& a, const StoredLandmark& b) {
   const auto common = static_cast<std::size_t>(count_together(a, b));
   return common > 1 || 4 * common > std::min(a.views_m.size(), b.views_m.size());
@@ -57,10 +57,11 @@ int count_beside(const StoredLandmark& a, const StoredLandmark& b) {
   }));
 }
 
-/// Odds of one trunk against two from who saw which on one way past them; none where no way saw
-/// both. Two trunks are seen together by one in three nodes that see either where each is seen by
-/// half of them; one trunk is seen twice by one in twenty (a scan that doubles it). A few sightings
-/// in turns happen by chance, and of one that was seen once many of the other one say little.
+/// Odds of one trunk against two from the nodes that observed each on one way past them; none if no
+/// way observed both. Of nodes that see either of two trunks, each seen by half of them, one in
+/// three sees both; a node sees one trunk twice with probability 1/20 (a scan that doubles it). A
+/// few alternating sightings happen by chance; if one was seen only once, many sightings of the
+/// other are weak evidence.
 std::optional<double> odds_by_turns(const StoredLandmark& a, const StoredLandmark& b) {
   constexpr double kAlone = (1.0 - 0.05) / (1.0 - 1.0 / 3.0);
   constexpr double kTogether = 0.05 / (1.0 / 3.0);
@@ -72,14 +73,14 @@ std::optional<double> odds_by_turns(const StoredLandmark& a, const StoredLandmar
   return std::pow(kAlone, alone) * std::pow(kTogether, count_together(a, b));
 }
 
-/// What the landmarks around tell of two that are near each other.
+/// Statistics of the landmarks around a pair.
 struct Neighbourhood {
   double density_per_m2 = 0.0;
-  /// Odds that of two passes each misses what the other one sees, against both seeing it.
+  /// Odds that each of two passes missed the other's landmark, against both passes seeing it.
   double missing_odds = 1.0;
 };
 
-/// From how many landmarks were observed on this pass, on earlier ones, and on both.
+/// Counts the landmarks that were observed on this pass, on earlier ones, and on both.
 Neighbourhood neighbourhood_of(const Eigen::Vector2d& position_m, const GlobalMap& map) {
   const double limit_m = map.graph.node(*map.graph.newest()).along_m - kEarlierPass_m;
   double all = 0.0;
@@ -97,33 +98,33 @@ Neighbourhood neighbourhood_of(const Eigen::Vector2d& position_m, const GlobalMa
         both += some && !std::all_of(nodes.begin(), nodes.end(), is_earlier) ? 1.0 : 0.0;
       });
 
-  // Of passes that see a share q each, q / (2 - q) of what either sees is seen by both.
+  // If each pass sees a share q, q / (2 - q) of the landmarks seen by either are seen by both.
   const double shared = (both + 0.5) / (all + 1.0);
   const double seen = 2.0 * shared / (1.0 + shared);
   const double missing = (1.0 - seen) / seen;
   return {all / (std::numbers::pi * kNeighbourhood_m * kNeighbourhood_m), missing * missing};
 }
 
-/// Density [1/m^2] of the distance of two landmarks that are one.
+/// Density [1/m^2] of the distance of two landmarks that are one trunk.
 double density_of_one(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2) {
   const double squared = apart_m.dot(covariance_m2.inverse() * apart_m);
   return std::pow(1.0 + squared / kTail, -0.5 * (kTail + 2.0)) /
          (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
 }
 
-/// How far from a landmark one observation of it may lie, to be associated with it [m].
+/// Largest distance of a single observation from its landmark for association [m].
 double gate_of_one_m(const StoredLandmark& landmark, const SmoothingMapperParameters& parameters) {
   const double views = static_cast<double>(std::max<std::size_t>(1, landmark.views_m.size()));
   return parameters.gate_sigmas * std::sqrt(views / landmark.information) + parameters.gate_floor_m;
 }
 
-/// Share of the landmarks that so many nodes observed which bad scans moved.
+/// Share of the landmarks with this number of nodes that bad scans displaced.
 double chance_of_moved(std::size_t nodes) {
   return kMoved * std::pow(kMovedAgain, static_cast<double>(nodes) - 1.0);
 }
 
-/// The density of two on one way, of which bad scans put this share anywhere within the distance
-/// within which doubles are looked for, and the others have the errors that are stated.
+/// Likewise for two landmarks of one way: a share `moved` was displaced by bad scans, uniformly
+/// within the search distance for doubles; the others have the stated errors.
 double density_of_moved(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2,
                         double moved, double merge_distance_m) {
   const double squared = apart_m.dot(covariance_m2.inverse() * apart_m);
@@ -132,7 +133,7 @@ double density_of_moved(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& c
   return stated + moved / (std::numbers::pi * merge_distance_m * merge_distance_m);
 }
 
-/// Whether a third landmark, that is another one than one of the two, lies where they may be.
+/// Whether a third landmark, different from one of the two, lies in the same place.
 bool has_rival(const StoredLandmark& a, const StoredLandmark& b, double radius_m,
                const LandmarkMap& landmarks) {
   bool result = false;
@@ -150,7 +151,7 @@ enum class Sameness {
   kTwo,
   kOneByPlace,
   kOne,
-  kOneNoPoint,  ///< One that was observed as two points.
+  kOneNoPoint,  ///< One object that was observed as two points.
 };
 
 Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
@@ -159,7 +160,7 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   const bool touch = apart.norm() < std::max({kTouching_m, a.radius_m, b.radius_m});
   if (!touch && are_observed_together(a, b)) return Sameness::kTwo;
 
-  // Where they are, and whether that can tell neighbours apart.
+  // Their distance, and whether its covariance resolves neighbours.
   const auto covariance = map.graph.difference_covariance(a.id, b.id);
   if (!covariance) return Sameness::kTwo;
   const double gate_m =
@@ -167,7 +168,7 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   if (gate_m > parameters.merge_distance_m || has_rival(a, b, gate_m, map.landmarks))
     return Sameness::kTwo;
 
-  // Of two that were never seen on one way each pass missed one.
+  // Never seen on one way: each pass missed one of two trunks, if there are two.
   if (touch) {
     const double squared = apart.dot(covariance->inverse() * apart);
     return squared > parameters.outlier_chi2 ? Sameness::kOneNoPoint : Sameness::kOne;
@@ -181,10 +182,11 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
       density_of_one(apart, spread) >= kLeastOdds * two_by_place)
     return Sameness::kOneByPlace;
 
-  // Of two that were, none was missed.
+  // Seen on one way: no pass missed a trunk.
   const auto turns = odds_by_turns(a, b);
   if (!turns) return Sameness::kTwo;
-  // Within the gate the scans of one are taken for the other's now and then: no bad scans.
+  // Within the gate, detections of one are sometimes associated with the other: no sign of bad
+  // scans.
   const std::size_t fewest = std::min(a.views_m.size(), b.views_m.size());
   const double gate_m_of_one = std::max(gate_of_one_m(a, parameters), gate_of_one_m(b, parameters));
   const double moved = apart.norm() > gate_m_of_one ? chance_of_moved(fewest) : 0.0;

@@ -1,4 +1,4 @@
-// Landmarks that are the same, found by where they are.
+// Finds landmarks that are one trunk by their positions.
 #pragma once
 
 #include <span>
@@ -9,16 +9,16 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Merges landmarks that are one by all that is known of their distance. The joint covariance must
-/// tell neighbours apart, and the two must not have been observed side by side. Then they are one
-/// where two trunks would touch, or where that is much likelier than two neighbours: of which two
-/// passes saw one each, by their distance in its covariance, by how dense landmarks stand around,
-/// and by how many of these both passes saw; or that were seen on one way past them, by who saw
-/// which and by their distance, which bad scans may have moved. Of two that touch and whose
-/// distance contradicts its covariance, what the one that was seen less was observed as does not
-/// count: one thing, but no point. Where the covariance is large, only the neighbourhood as a whole
-/// can tell: PassJoiner. Looks around the landmarks of `ids`, up to `merge_distance_m`. The graph
-/// is not solved. Returns the merged pairs.
+/// Merges two landmarks that are one trunk according to their distance and its covariance.
+/// Conditions: the joint covariance resolves neighbouring trunks, and no node observed the two side
+/// by side. Then they are merged if they touch, or if one trunk is much more likely than two. If
+/// each of two passes saw one of them, the likelihood depends on their distance and its covariance,
+/// the density of landmarks around, and the share of these that both passes saw. If they were seen
+/// on one way past them, it depends on the nodes that observed each and on their distance, which
+/// bad scans may have changed. If two touch but their distance contradicts its covariance, the
+/// observations of the less observed one are ignored: it is one object, but no point. With a large
+/// covariance only the whole neighbourhood can decide: PassJoiner. Searches around the landmarks of
+/// `ids`, up to `merge_distance_m`. The graph is not solved. Returns the merged pairs.
 std::vector<MergedPair> merge_doubles(std::span<const model::LandmarkId> ids,
                                       const SmoothingMapperParameters& parameters, Merges& merges,
                                       GlobalMap& map);

@@ -7,9 +7,9 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Where the vehicle's distance to a pass is known this well [m], gates find its landmarks.
+/// With this sigma of the distance to a pass [m], gates are sufficient to match its landmarks.
 constexpr double kKnown_m = 0.1;
-/// Most passes that are asked.
+/// Largest number of passes considered.
 constexpr std::size_t kMostPasses = 4;
 
 double larger_sigma(const Eigen::Matrix3d& covariance) {
@@ -47,8 +47,9 @@ std::vector<NearNode> nearest_of_each(std::vector<NearNode> nodes) {
   return nearest;
 }
 
-/// A given map has no path. Its landmarks that were not seen yet are a pass: as the map tells them,
-/// or, where it came with another map, from the node that they are told from.
+/// A given map has no path. Its landmarks that were not observed yet form a pass: in their given
+/// frame, or, if it came with an absorbed map, relative to the node that represents that map's
+/// origin.
 std::optional<NearNode> given_around(const Eigen::Vector2d& here_m, double range_m,
                                      const GlobalMap& map) {
   for (const model::LandmarkId id : map.landmarks.index().near({here_m, range_m})) {
@@ -61,7 +62,7 @@ std::optional<NearNode> given_around(const Eigen::Vector2d& here_m, double range
   return std::nullopt;
 }
 
-/// Where the asked node is to the pass.
+/// Pose of the queried node relative to the pass.
 std::optional<geometry::SE2WithCovariance> relative_to(const NearNode& pass, NodeIndex at,
                                                        const PoseGraph& graph) {
   if (pass.node) return graph.relative(*pass.node, at);

@@ -11,11 +11,11 @@ namespace {
 
 namespace plane = factor_graph::plane;
 
-/// The pose that holds the map is known to a micrometre.
+/// Information of the pose that holds the map: a micrometre.
 constexpr double kHeldInformation = 1e12;
-/// Path's time [s] for which one bias of the gyro stands; as in GyroBias.
+/// Driving time [s] per bias of the gyro; as in GyroBias.
 constexpr double kBias_s = 5.0;
-/// Part of chi^2 by which a step lowers it that is the last.
+/// The iteration ends when a step lowers chi^2 by less than this share.
 constexpr double kLastDecrease = 1e-11;
 
 /// Builds the graph of a drive, stretch by stretch.
@@ -45,7 +45,7 @@ class Expansion {
   }
 
   ExpandedDrive take() {
-    // In order of time, whatever stretch they are of.
+    // In order of time, whatever their stretch.
     std::sort(motions_.begin(), motions_.end(),
               [](const auto& a, const auto& b) { return std::max(a.a, a.b) < std::max(b.a, b.b); });
     for (const Stretch::Motion& motion : motions_) add(motion);
@@ -92,7 +92,7 @@ class Expansion {
     seconds_ += motion.seconds;
   }
 
-  /// One for each kBias_s of motion; a random walk between them.
+  /// One per kBias_s of motion, with a random walk between them.
   plane::ScalarId bias_of(const Stretch::Motion& motion) {
     if (bias_ && seconds_ < kBias_s) return *bias_;
     plane::Graph& graph = result_.graph;
@@ -117,7 +117,7 @@ class Expansion {
   std::map<model::LandmarkId, plane::PointId> points_;
   std::vector<Stretch::Motion> motions_;
   std::optional<plane::ScalarId> bias_;
-  double seconds_ = 0.0;  ///< Of the motions since that bias began.
+  double seconds_ = 0.0;  ///< Of the motions with the present bias.
 };
 
 }  // namespace
@@ -126,7 +126,7 @@ void LandmarkAliases::add(std::span<const std::pair<model::LandmarkId, model::La
   for (const auto& [old_id, new_id] : merged) {
     newer_[old_id] = new_id;
     newer_.erase(
-        new_id);  // It is in the map: a merge of it was taken back. So no chain is a circle.
+        new_id);  // A landmark of the map: a merge of it was undone. So the chain has no circle.
   }
 }
 

@@ -1,4 +1,4 @@
-// A drive put together again from the factors of its stretches.
+// Rebuilds the full graph of a drive from the factors of its stretches.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +14,19 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Which landmark an id of earlier stands for now.
+/// Maps earlier ids of landmarks to present ones.
 class LandmarkAliases {
  public:
-  /// These were merged, old -> new, after all that was told before.
+  /// Adds merges, old -> new, later than all added before.
   void add(std::span<const std::pair<model::LandmarkId, model::LandmarkId>> merged);
-  /// The landmark that has the observations of this one.
+  /// The landmark that now has the observations of this one.
   model::LandmarkId operator()(model::LandmarkId id) const;
 
  private:
   std::map<model::LandmarkId, model::LandmarkId> newer_;
 };
 
-/// A stretch and where its origin is, frame `map`: a first guess.
+/// A stretch and the pose of its origin, frame `map`: an initial guess.
 struct PlacedStretch {
   const Stretch* stretch = nullptr;
   geometry::SE2 map_T_origin;
@@ -50,19 +50,17 @@ struct ExpandedDrive {
   std::vector<model::KeyframePose> trajectory() const;
 };
 
-/// Puts a drive together (thesis on submaps §2.3.3: the submaps are expanded, and the full graph is
-/// optimised with the approximate solution as initial estimate). Each stretch has a bias of the
-/// gyro of its own, tied to the one before by the random walk of `parameters`. The node that holds
-/// the map, number 0, must be in a stretch: it is held where it is. Not in the graph: loop closures
-/// from outside, and what nodes that were taken out on known ground gave to condensed ones.
-/// O(factors).
+/// Builds the full graph of a drive (thesis on submaps §2.3.3: the submaps are expanded, and the
+/// full graph is optimised with the approximate solution as initial estimate). Each stretch has its
+/// own gyro bias, tied to the previous one by the random walk of `parameters`. Node 0, the origin
+/// of the map, must be in a stretch: it is held fixed. Not in the graph: external loop closures,
+/// and observations that condensed nodes got from nodes removed on known ground. O(factors).
 ExpandedDrive expand(std::span<const PlacedStretch> stretches, const LandmarkAliases& aliases,
                      const SmoothingMapperParameters& parameters);
 
-/// Moves the drive to its optimum. Observations that contradict it then by more than
-/// `outlier_chi2`, as after a merge that was taken back, are taken out. False, and nothing is
-/// changed, where the factors leave a variable undetermined. Costs some factorisations of the
-/// whole.
+/// Moves the drive to its optimum. Observations that then contradict it by more than
+/// `outlier_chi2`, as after a merge that was undone, are removed. Returns false without change if
+/// the factors leave a variable undetermined. Cost: some factorisations of the whole.
 bool settle(ExpandedDrive& drive, const SmoothingMapperParameters& parameters);
 
 }  // namespace understory::geoslam_mapper::smoothing

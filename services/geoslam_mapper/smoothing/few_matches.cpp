@@ -8,9 +8,9 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Scans whose pairs and guess agree less well than by these odds are taken not to agree.
+/// Probability of chi^2 below which pairs and guess are taken to disagree.
 constexpr double kDisagree = 1e-3;
-/// Odds of so many pairs by chance from which they are no evidence.
+/// Probability of this number of pairs by chance, above which they are no evidence.
 constexpr double kByChance = 1e-2;
 
 /// sum of x^k / k! for k < n.
@@ -29,8 +29,8 @@ double survival(double chi2, std::size_t n) {
   return std::exp(-0.5 * chi2) * exponential_part(0.5 * chi2, n);
 }
 
-/// Errors of the clear pairs and of the guess, at the pose that was found. The guess has as many
-/// numbers as the pose, so each pair adds its two.
+/// Errors of the unambiguous pairs and of the guess, at the pose found. The guess has as many
+/// dimensions as the pose, so each pair adds its two.
 double chi2_of(const MatchedScan& scan) {
   const geometry::SE2& pose = scan.found.reference_T_observed;
   const Eigen::Vector3d off = (scan.guess.mean.inverse() * pose).Log();
@@ -45,8 +45,8 @@ double chi2_of(const MatchedScan& scan) {
   return chi2;
 }
 
-/// How many of the observed points are expected to have a landmark in their gates if none of them
-/// were one: by the landmarks' density and the gates' areas before the matches.
+/// Expected number of observed points with a landmark in their gates by chance: from the landmarks'
+/// density and the gates' areas before the matches.
 double expected_by_chance(const MatchedScan& scan, const geometry::RegistrationParameters& gating,
                           double reach_m) {
   const double area_m2 = std::numbers::pi * reach_m * reach_m;

@@ -5,7 +5,7 @@ namespace {
 
 /// More associations than this cannot all be of one pedestrian.
 constexpr std::size_t kFewLandmarks = 2;
-/// Over longer times the filter drifts, too.
+/// Beyond this time the filter's drift is too large.
 constexpr model::Utime kFilterGate_us = 3'000'000;
 
 }  // namespace
@@ -18,13 +18,13 @@ bool contradicts_filter(const model::Keyframe& keyframe, const Placement& placem
     return filtered && (filtered->inverse() * motion).translation().norm() > limit_m;
   };
 
-  // Within the keyframe.
+  // Motion within the keyframe.
   const model::KeyframeMember& first = keyframe.members.front();
   const model::KeyframeMember& last = keyframe.members.back();
   if (differs(first.utime, last.utime, first.centre_T_vehicle.inverse() * last.centre_T_vehicle))
     return true;
 
-  // Since the last accepted keyframe.
+  // Motion since the last accepted keyframe.
   if (map.trajectory.bases().empty()) return false;
   const Base& base = map.trajectory.last();
   if (base.utime + kFilterGate_us < keyframe.utime) return false;

@@ -1,4 +1,4 @@
-// Whether the filter's motion contradicts a placement.
+// Tests a placement against the filter's motion.
 #pragma once
 
 #include "common/model/keyframe.hpp"
@@ -8,10 +8,10 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// True where a keyframe with at most two associations moved by more than `limit_m` otherwise than
-/// the filter: within itself, or since the last accepted keyframe if that is at most 3 s old. A
-/// pedestrian taken for the only trunk in view would otherwise drag the map along. Always false
-/// with a limit of 0.
+/// True if the motion of a keyframe with at most two associations differs from the filter's by more
+/// than `limit_m`: within the keyframe, or since the last accepted keyframe if that is at most 3 s
+/// old. Without it a pedestrian, associated with the only trunk in view, would drag the map along.
+/// Always false with a limit of 0.
 bool contradicts_filter(const model::Keyframe& keyframe, const Placement& placement,
                         const FilterTrack& filter, const GlobalMap& map, double limit_m);
 

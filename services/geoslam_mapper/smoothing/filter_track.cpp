@@ -8,7 +8,7 @@ namespace understory::geoslam_mapper::smoothing {
 namespace {
 
 constexpr model::Utime kKept_us = 10'000'000;
-/// A pose this near in time is extrapolated by its own velocity.
+/// A pose within this time is extrapolated by its own velocity.
 constexpr model::Utime kNear_us = 60'000;
 
 }  // namespace

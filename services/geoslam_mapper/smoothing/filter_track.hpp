@@ -10,7 +10,7 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// The filter's poses of the last 10 s. They serve as a gate, never as a measurement: the filter
+/// The filter's poses of the last 10 s. They are used as a gate, never as a measurement: the filter
 /// uses the same detections.
 class FilterTrack {
  public:
@@ -18,7 +18,7 @@ class FilterTrack {
   /// all poses before it.
   void add(const model::EkfPose& pose);
 
-  /// Motion of the vehicle between two times; none where the filter gave no pose within 60 ms of
+  /// Motion of the vehicle between two times; none unless the filter has a pose within 60 ms of
   /// both.
   std::optional<geometry::SE2> between(model::Utime from, model::Utime to) const;
 

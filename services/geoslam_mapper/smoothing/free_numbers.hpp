@@ -1,4 +1,4 @@
-// Numbers that serve again.
+// Free list of numbers.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Numbers of things that are gone, given out again to new ones, with undo to the checkpoint. Every
-/// function but rollback() is O(1).
+/// Numbers of removed objects for reuse, with undo to the checkpoint. Every function but rollback()
+/// is O(1).
 class FreeNumbers {
  public:
-  /// A number that is free; none where all are in use.
+  /// Takes a free number; none if there is none.
   std::optional<std::uint32_t> take() {
     if (free_.empty()) return std::nullopt;
     const std::uint32_t number = free_.back();
@@ -20,17 +20,17 @@ class FreeNumbers {
     changes_.emplace_back(true, number);
     return number;
   }
-  /// Its thing is gone.
+  /// Adds the number of a removed object.
   void give(std::uint32_t number) {
     free_.push_back(number);
     changes_.emplace_back(false, number);
   }
-  /// Those that are free.
+  /// The free numbers.
   const std::vector<std::uint32_t>& numbers() const { return free_; }
-  /// How many are free.
+  /// Count of free numbers.
   std::size_t size() const { return free_.size(); }
 
-  /// The checkpoint is now.
+  /// Sets the checkpoint.
   void checkpoint() { changes_.clear(); }
   /// Back to the checkpoint. O(changes).
   void rollback() {
@@ -51,7 +51,8 @@ class FreeNumbers {
 
  private:
   std::vector<std::uint32_t> free_;
-  std::vector<std::pair<bool, std::uint32_t>> changes_;  ///< Taken (or given), since then.
+  std::vector<std::pair<bool, std::uint32_t>>
+      changes_;  ///< Taken (or given), since the checkpoint.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

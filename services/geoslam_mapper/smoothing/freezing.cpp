@@ -1,4 +1,4 @@
-// Nodes out of the solved graph, and what they measure of those that stay.
+// Frozen nodes, and their condensed measurements of other nodes.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,7 +11,7 @@ namespace {
 
 namespace plane = factor_graph::plane;
 
-/// Most nodes that a frozen part is tied to: their joint measurement is dense.
+/// Most outer nodes of a frozen part: their joint measurement is dense.
 constexpr std::size_t kMostOuter = 24;
 
 }  // namespace
@@ -33,7 +33,7 @@ bool PoseGraph::freeze(std::span<const NodeIndex> nodes) {
     if (!next) return false;
   }
 
-  // What they are tied to; what was frozen before is part of it as one measurement.
+  // Motions to the nodes around; parts frozen earlier are included as one measurement.
   const std::vector<FrozenMotion> theirs = motions_around(going);
   const auto fresh = condense_parts(parts_of(theirs, frozen_factors_, going));
   if (!fresh) return false;
@@ -52,8 +52,7 @@ bool PoseGraph::freeze(std::span<const NodeIndex> nodes) {
   return true;
 }
 
-/// How the nodes lie to each other and to those around them, each motion once, with the bias as
-/// known now.
+/// Motions of the nodes among each other and to nodes around, each once, with the present bias.
 std::vector<FrozenMotion> PoseGraph::motions_around(const std::set<NodeIndex>& nodes) const {
   std::vector<FrozenMotion> around;
   for (const NodeIndex node : nodes) {
@@ -69,7 +68,7 @@ std::vector<FrozenMotion> PoseGraph::motions_around(const std::set<NodeIndex>& n
   return around;
 }
 
-/// Those motions go out of the solved graph.
+/// Removes those motions from the solved graph.
 void PoseGraph::take_motions_out(const std::set<NodeIndex>& nodes) {
   for (const NodeIndex node : nodes) {
     for (const MotionRef ref : std::exchange(edit(node).edit_motions(), {})) {
@@ -96,12 +95,12 @@ bool PoseGraph::thaw(std::span<const NodeIndex> nodes) {
   return true;
 }
 
-/// The node is a variable again, where it was frozen.
+/// Makes a frozen node a variable again.
 void PoseGraph::release(NodeIndex node) {
   if (frozen_.erase(node)) smoother_.unpark(nodes_[node].centre);
 }
 
-/// Nothing that was measured may be lost: what cannot be condensed is solved with the rest.
+/// No measurement may be lost: a part that cannot be condensed returns to the solved graph.
 void PoseGraph::recondense_frozen() {
   const std::set<NodeIndex> frozen = frozen_.all();
   auto factors = condense_parts(parts_of(frozen_motions_.all(), {}, frozen));
@@ -114,7 +113,7 @@ void PoseGraph::recondense_frozen() {
   set_frozen_factors();
 }
 
-/// Motions of which no end is frozen are in the solved graph again.
+/// Returns motions without a frozen end to the solved graph.
 void PoseGraph::give_back(std::span<const FrozenMotion> motions) {
   std::set<TiedNodes> tied;
   for (const FrozenMotion& one : motions) {
@@ -130,7 +129,7 @@ void PoseGraph::give_back(std::span<const FrozenMotion> motions) {
   renew(tied);
 }
 
-/// None where a part does not determine its nodes, or is tied to too many.
+/// None if a part does not determine its nodes, or has too many outer nodes.
 std::optional<std::vector<FrozenFactor>> PoseGraph::condense_parts(
     const std::vector<FrozenPart>& parts) const {
   std::vector<FrozenFactor> factors;
@@ -176,7 +175,7 @@ void PoseGraph::hold(const Anchor& anchor) {
   smoother_.hold(nodes_[anchor.node].centre, anchor.map_T_node);
 }
 
-/// The condensed node that stays in the solved graph and is nearest on the path to those that go.
+/// The condensed node of the solved graph that is nearest on the path to the nodes that leave it.
 std::optional<Anchor> PoseGraph::anchor_beyond(const std::set<NodeIndex>& going) const {
   double last_m = -std::numeric_limits<double>::infinity();
   for (const NodeIndex node : going) last_m = std::max(last_m, nodes_[node].along_m);

@@ -7,10 +7,12 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// What is left of a diagonal element after the directions before it is rounding below this share.
+/// Below this share of a diagonal element, the rest after elimination of earlier directions is
+/// rounding.
 constexpr double kNothingLeft = 1e-12;
 
-/// Of a positive semidefinite matrix; a direction that tells nothing has a column of zeros.
+/// Cholesky factor of a positive semidefinite matrix; a direction without information has a column
+/// of zeros.
 Eigen::Matrix3d root_of(const Eigen::Matrix3d& information) {
   Eigen::Matrix3d root = Eigen::Matrix3d::Zero();
   for (int k = 0; k < 3; ++k) {

@@ -1,4 +1,4 @@
-// The motions of nodes that are out of the solved graph, in little room.
+// Compact store of the motions of nodes outside the solved graph.
 #pragma once
 
 #include <array>
@@ -11,15 +11,15 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Motions of which one end at least is frozen. They are needed only where the node comes back, and
-/// there are some for each 20 m that were ever driven: each takes 44 bytes, in single precision
-/// (some micrometres, and a ten-millionth of the information). Closures, and motions between nodes
-/// whose numbers lie far apart, are few and kept whole.
+/// Motions with at least one frozen end. They are needed only when the node thaws, and there are
+/// some for each 20 m ever driven: each takes 44 bytes, in single precision (some micrometres, and
+/// 1e-7 of the information). Closures, and motions between nodes with distant numbers, are few and
+/// kept in full.
 class FrozenMotions {
  public:
-  /// Adds one.
+  /// Adds a motion.
   void add(const FrozenMotion& motion);
-  /// Takes out those of which no end is among these nodes.
+  /// Removes and returns the motions with no end among these nodes.
   std::vector<FrozenMotion> take_beyond(const NodeSet& frozen);
   /// All of them. O(motions).
   std::vector<FrozenMotion> all() const;
@@ -37,7 +37,7 @@ class FrozenMotions {
  private:
   struct Packed {
     NodeIndex a = 0;
-    std::int16_t a_to_b = 0;  ///< From the one's number to the other's.
+    std::int16_t a_to_b = 0;  ///< Difference of the two nodes' numbers.
     std::uint16_t away = 0;
     std::array<float, 3> a_T_b{};  ///< x, y [m], heading [rad].
     /// Lower triangle of the information's Cholesky factor, by rows.
@@ -53,7 +53,7 @@ class FrozenMotions {
   static Packed packed(const FrozenMotion& motion);
   static FrozenMotion unpacked(const Packed& packed);
 
-  std::deque<Packed> packed_;  ///< No room that is not used: it grows by blocks.
+  std::deque<Packed> packed_;  ///< Grows by blocks, without unused capacity.
   std::vector<FrozenMotion> whole_;
 };
 

@@ -14,17 +14,17 @@ namespace {
 
 namespace plane = factor_graph::plane;
 
-/// Keeps a pose where it is: a micrometre, a microradian.
+/// Holds a pose fixed: a micrometre, a microradian.
 const Eigen::Matrix3d kHeld = 1e12 * Eigen::Matrix3d::Identity();
-/// What an outer node is held with where it is, while a part is solved: a tie of few landmarks may
-/// leave it open, and the far end of a long chain is all but open [1/m^2, 1/rad^2]. It is taken out
-/// of the result exactly, and keeps what is inverted well conditioned.
+/// Weak prior on an outer node's initial pose while a part is solved [1/m^2, 1/rad^2]: a tie of few
+/// landmarks may leave the pose undetermined, and so, nearly, may a long chain. It is subtracted
+/// from the result exactly, and keeps the inverted matrix well conditioned.
 constexpr double kLeash = 1e-2;
-/// Share of the largest eigenvalue of an information that is rounding.
+/// Share of an information's largest eigenvalue that is rounding.
 constexpr double kRounding = 1e-15;
-/// Updates of a part; a chain that is bent by metres takes some.
+/// Most updates of a part; a chain that is bent by metres needs several.
 constexpr int kUpdates = 12;
-/// They end where no pose moves by more [m].
+/// The updates end when no pose moves by more than this [m].
 constexpr double kSettled_m = 1e-5;
 
 /// A part with its nodes as poses: the outer ones first.
@@ -33,7 +33,7 @@ struct Solved {
   std::map<NodeIndex, plane::PoseId> pose_of;
 };
 
-/// `held`: how many of the outer nodes stay where they are; the others are on a leash.
+/// `held`: number of outer nodes that stay fixed; the others have the weak prior.
 std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::size_t held) {
   Solved solved;
   const auto add = [&](NodeIndex node) {
@@ -75,7 +75,7 @@ std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::
   return solved;
 }
 
-/// Sets of nodes that hang together (union-find).
+/// Connected sets of nodes (union-find).
 class Bundles {
  public:
   explicit Bundles(const std::set<NodeIndex>& nodes) {
@@ -84,7 +84,7 @@ class Bundles {
 
   bool contains(NodeIndex node) const { return parent_.contains(node); }
   void tie(NodeIndex a, NodeIndex b) { parent_[root_of(a)] = root_of(b); }
-  /// The one that stands for all of a bundle.
+  /// The representative of a node's set.
   NodeIndex root_of(NodeIndex node) {
     NodeIndex root = node;
     while (parent_.at(root) != root) root = parent_.at(root);
@@ -96,7 +96,8 @@ class Bundles {
   std::map<NodeIndex, NodeIndex> parent_;
 };
 
-/// Ties those of these nodes that are among the bundles; one of them, none where there is none.
+/// Joins the sets of these nodes, ignoring nodes without a set; returns one of the nodes, none if
+/// all were ignored.
 std::optional<NodeIndex> tie_all(std::span<const NodeIndex> nodes, Bundles& bundles) {
   std::optional<NodeIndex> first;
   for (const NodeIndex node : nodes) {
@@ -117,7 +118,7 @@ void add_outer(std::span<const NodeIndex> nodes, const Bundles& bundles, FrozenP
 std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
                                  std::span<const FrozenFactor> factors,
                                  const std::set<NodeIndex>& nodes) {
-  // What hangs together.
+  // Finds connected nodes.
   Bundles bundles(nodes);
   std::vector<std::pair<NodeIndex, const FrozenMotion*>> of_motions;
   for (const FrozenMotion& one : motions) {
@@ -128,7 +129,7 @@ std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
   for (const FrozenFactor& one : factors)
     if (const auto node = tie_all(one.nodes, bundles)) of_factors.emplace_back(*node, &one);
 
-  // The parts, and what they are tied to.
+  // The parts, and their outer nodes.
   std::map<NodeIndex, FrozenPart> parts;
   for (const NodeIndex node : nodes) parts[bundles.root_of(node)].inner.push_back(node);
   for (const auto& [node, one] : of_motions) {
@@ -142,8 +143,8 @@ std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
     add_outer(one->nodes, bundles, part);
   }
 
-  // The origin of the map, node 0, last: seen from there all others are one far away, and what they
-  // measure of it drowns in rounding.
+  // The origin of the map, node 0, last: from there all other nodes are equally far away, and their
+  // measurements of each other are lost in rounding.
   std::vector<FrozenPart> result;
   for (auto& [root, part] : parts) {
     std::ranges::sort(part.outer, std::greater{});
@@ -166,7 +167,7 @@ std::optional<FrozenFactor> condensed(const FrozenPart& part, const PoseOf& pose
   const Eigen::MatrixXd leashed = joint->inverse();
   if (!leashed.allFinite()) return std::nullopt;
 
-  // Without the leash: what is left is positive semidefinite but for rounding.
+  // Subtracts the weak prior: the result is positive semidefinite except for rounding.
   const Eigen::MatrixXd leash = kLeash * Eigen::MatrixXd::Identity(leashed.rows(), leashed.cols());
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
       0.5 * (leashed + leashed.transpose()) - leash);
@@ -175,7 +176,8 @@ std::optional<FrozenFactor> condensed(const FrozenPart& part, const PoseOf& pose
   const Eigen::VectorXd inverse_values =
       values.unaryExpr([&](double value) { return value > least ? 1.0 / value : 0.0; });
 
-  // Where it leaves the nodes: the leash pulled them towards where they were.
+  // Mean of the measurement without the weak prior, which pulled the nodes towards their initial
+  // poses.
   Eigen::VectorXd pulled(leashed.rows());
   for (std::size_t i = 0; i < others.size(); ++i) {
     const geometry::SE2 was_T_now =

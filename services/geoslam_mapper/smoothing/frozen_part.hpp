@@ -1,4 +1,4 @@
-// A part of the graph that is solved by itself.
+// A part of the graph that is solved separately.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ struct FrozenMotion {
   NodeIndex b = 0;
   geometry::SE2 a_T_b;
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  /// It stands for landmarks of so many submaps that are kept elsewhere; 0: a motion of the nodes.
+  /// Number of stored submaps whose landmarks it represents; 0: a measured motion.
   std::uint32_t away = 0;
-  std::uint64_t closure = 0;  ///< Its number; 0: none.
+  std::uint64_t closure = 0;  ///< Its id; 0: no closure.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -30,22 +30,22 @@ struct FrozenMotion {
   }
 };
 
-/// What frozen nodes measure of others.
+/// Condensed measurement among nodes, made of frozen nodes.
 struct FrozenFactor {
-  std::vector<NodeIndex> nodes;  ///< The first is the one in whose frame the others are.
-  factor_graph::plane::CondensedPoses measured;  ///< Its `poses` mean nothing.
+  std::vector<NodeIndex> nodes;                  ///< The first is the frame of the others.
+  factor_graph::plane::CondensedPoses measured;  ///< Its `poses` are not used.
 };
 
-/// Nodes to be frozen that hang together, and the nodes that they are tied to.
+/// Connected nodes to be frozen, and the nodes around that they are tied to.
 struct FrozenPart {
   std::vector<NodeIndex> inner;
   std::vector<NodeIndex> outer;  ///< The origin of the map last.
   std::vector<FrozenMotion> motions;
-  std::vector<FrozenFactor> factors;  ///< Of nodes that were frozen before.
+  std::vector<FrozenFactor> factors;  ///< Of nodes that were frozen earlier.
 };
 
-/// The parts that motions and earlier parts make of nodes to be frozen; those that touch none are
-/// passed over. O(n log n).
+/// The connected parts of the nodes to be frozen, with the motions and earlier factors that touch
+/// them; others are skipped. O(n log n).
 std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
                                  std::span<const FrozenFactor> factors,
                                  const std::set<NodeIndex>& nodes);
@@ -53,11 +53,12 @@ std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
 /// Pose of a node.
 using PoseOf = std::function<geometry::SE2(NodeIndex)>;
 
-/// What a part measures of its outer nodes: it is optimised on its own, and the outer nodes have
-/// their joint marginal in the frame of the first (thesis on submaps §2.3.3, §3.4.2, with a node of
-/// the solved graph as origin). `pose_of` gives where to start. None where there is one outer node,
-/// or where the motions leave an inner node undetermined. Exact for Gaussian noise but for the
-/// linearisation at the part's own optimum. Cost: one factorisation of the part.
+/// Condensed measurement of a part's outer nodes: the part is optimised alone, and the result is
+/// the joint marginal of the outer nodes in the frame of the first (thesis on submaps §2.3.3,
+/// §3.4.2, with a node of the solved graph as origin). `pose_of` gives the initial poses. None if
+/// there is one outer node, or if the motions leave an inner node undetermined. Exact for Gaussian
+/// noise, except for the linearisation at the part's own optimum. Cost: one factorisation of the
+/// part.
 std::optional<FrozenFactor> condensed(const FrozenPart& part, const PoseOf& pose_of);
 
 }  // namespace understory::geoslam_mapper::smoothing

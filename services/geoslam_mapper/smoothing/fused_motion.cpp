@@ -12,7 +12,7 @@ constexpr double kOpen = 1e-9;
 /// Share of a sum's information that is rounding.
 constexpr double kRoundedOff = 1e-12;
 
-/// The least solution where the information leaves directions undetermined.
+/// The minimum-norm step if the information leaves directions undetermined.
 Eigen::Vector3d least_step(const Eigen::Matrix3d& information, const Eigen::Vector3d& gradient) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
   const double least = kOpen * solver.eigenvalues()[2];
@@ -22,7 +22,7 @@ Eigen::Vector3d least_step(const Eigen::Matrix3d& information, const Eigen::Vect
          gradient;
 }
 
-/// Of `to` as `from` sees it.
+/// Tangent vector of `to` in the frame of `from`.
 Eigen::Vector3d seen_from(const geometry::SE2& from, const geometry::SE2& to) {
   return (from.inverse() * to).Log();
 }

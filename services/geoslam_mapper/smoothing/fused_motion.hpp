@@ -1,4 +1,4 @@
-// Two measurements of one motion as one, and one of them taken out again.
+// Fuses two measurements of one motion, and removes one of them again.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@ namespace understory::geoslam_mapper::smoothing {
 /// A measured motion.
 struct MeasuredMotion {
   geometry::SE2 a_T_b;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< Of its error on the right.
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< Of its right perturbation.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -19,11 +19,11 @@ struct MeasuredMotion {
   }
 };
 
-/// Both as one: where the sum of their squared errors is least. What neither measures stays as
-/// `one` has it. Exact for motions that are near each other: the error is of second order.
+/// Fuses both: minimises the sum of their squared errors. Directions that neither measures stay as
+/// in `one`. The error is of second order in the distance of the two motions.
 MeasuredMotion fused(const MeasuredMotion& one, const MeasuredMotion& other);
-/// What of a fused motion is left without a part of it. Undoes fused() but for rounding; what
-/// rounding would make negative is zero.
+/// Removes a part from a fused motion. The inverse of fused(), except for rounding; information
+/// that rounding would make negative becomes zero.
 MeasuredMotion without(const MeasuredMotion& sum, const MeasuredMotion& part);
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -9,7 +9,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// So many landmarks that the map had before tie a keyframe to it: two points are a pose.
+/// Number of earlier landmarks of the map that ties a keyframe to it: two points determine a pose.
 constexpr std::size_t kTie = 2;
 
 /// chi^2 as a standard normal deviate (Wilson & Hilferty 1931).
@@ -18,7 +18,7 @@ double chi2_deviate(double chi2, double degrees_of_freedom) {
   return (std::cbrt(chi2 / degrees_of_freedom) - (1.0 - spread)) / std::sqrt(spread);
 }
 
-/// The keyframe as the node's centre would have observed it: what both observed ties the two frames
+/// The keyframe as observed from the node's centre: the common landmarks tie the two frames
 /// together.
 model::Keyframe in_frame_of(const geometry::SE2& node_T_keyframe, model::Keyframe keyframe) {
   const Eigen::Matrix2d rotation = node_T_keyframe.rotation();
@@ -31,8 +31,8 @@ model::Keyframe in_frame_of(const geometry::SE2& node_T_keyframe, model::Keyfram
   return keyframe;
 }
 
-/// A node that many passes added to knows its pose better than a keyframe that passes by knows its
-/// own: that one gets a node for itself, which may go later (KnownGround).
+/// The pose of a node with observations from many passes is more accurate than that of one
+/// keyframe: a keyframe of a new pass gets its own node, which may be removed later (KnownGround).
 bool is_of_this_pass(NodeIndex node, const SmoothingMapperParameters& parameters,
                      const PoseGraph& graph) {
   if (parameters.known_ground_m <= 0.0) return true;
@@ -40,8 +40,8 @@ bool is_of_this_pass(NodeIndex node, const SmoothingMapperParameters& parameters
          parameters.known_ground_m;
 }
 
-/// Whether landmarks tie the keyframe to the node. Without them the keyframe is only predicted to
-/// be there, and the motion that leads to the node would close a loop that nobody observed.
+/// Whether landmarks tie the keyframe to the node. Without them its pose is only predicted, and the
+/// motion to the node would close a loop that was never observed.
 bool holds(const Node& node, const Placement& placement) {
   const auto common = std::count_if(placement.associations.begin(), placement.associations.end(),
                                     [&](const model::Association& pair) {
@@ -50,7 +50,7 @@ bool holds(const Node& node, const Placement& placement) {
   return static_cast<std::size_t>(common) >= kHold;
 }
 
-/// The node for the keyframe, an old or a new one, and the keyframe in its frame.
+/// The node for the keyframe, existing or new, and the keyframe in its frame.
 FusedKeyframe enter(const model::Keyframe& arrived, const Placement& placement,
                     const SmoothingMapperParameters& parameters, GlobalMap& map) {
   const geometry::SE2& map_T_centre = placement.map_T_centre.mean;
@@ -85,7 +85,7 @@ void add_observations(const FusedKeyframe& fused, const SmoothingMapperParameter
   }
 }
 
-/// Sums up the associations that fit; the others are returned.
+/// Adds up chi^2 of the associations that fit; returns the others.
 std::set<model::LandmarkId> judge(FusedKeyframe& fused, double outlier_chi2,
                                   const PoseGraph& graph) {
   std::set<model::LandmarkId> outliers;
@@ -101,8 +101,8 @@ std::set<model::LandmarkId> judge(FusedKeyframe& fused, double outlier_chi2,
   return outliers;
 }
 
-/// Solves, takes out single associations that do not fit, and judges the rest. False with the
-/// reason where the keyframe contradicts the map.
+/// Solves, removes single associations that do not fit, and judges the rest. False with the reason
+/// if the keyframe contradicts the map.
 bool solve(FusedKeyframe& fused, const SmoothingMapperParameters& parameters, PoseGraph& graph) {
   factor_graph::plane::SmootherUpdate solved = graph.solve();
   fused.is_determined = solved.ok;
@@ -124,7 +124,7 @@ bool solve(FusedKeyframe& fused, const SmoothingMapperParameters& parameters, Po
   }
   if (outliers.empty()) return true;
 
-  // Without the outliers.
+  // Removes the outliers.
   for (const model::LandmarkId id : outliers) graph.ignore(fused.node, id);
   std::erase_if(fused.associations, [&](const model::Association& pair) {
     return outliers.contains(pair.landmark_id);
@@ -135,7 +135,7 @@ bool solve(FusedKeyframe& fused, const SmoothingMapperParameters& parameters, Po
   return solved.ok;
 }
 
-/// What the landmarks' observations add up to.
+/// Updates the landmarks' counts and sums of observations.
 void count_observations(const FusedKeyframe& fused, GlobalMap& map) {
   for (const model::Association& pair : fused.associations) {
     const model::KeyframeLandmark& observed = fused.keyframe.landmarks[pair.keyframe_landmark];
@@ -150,8 +150,8 @@ void count_observations(const FusedKeyframe& fused, GlobalMap& map) {
   }
 }
 
-/// The keyframe in the solved graph, with the stretch as one node. Where it is not `ok` the graph
-/// is as before.
+/// Adds the keyframe to the solved graph and condenses the stretch. Unless the result is `ok`, the
+/// graph is unchanged.
 FusedKeyframe attempt(const model::Keyframe& arrived, const Placement& placement,
                       const Motion& motion, const SmoothingMapperParameters& parameters,
                       std::span<const NodeIndex> stretch, GlobalMap& map) {
@@ -174,7 +174,7 @@ FusedKeyframe fuse(const model::Keyframe& arrived, const Placement& placement, c
                    GlobalMap& map) {
   FusedKeyframe fused = attempt(arrived, placement, motion, parameters, stretch, map);
   if (!fused.is_determined && !fused.condensed.empty()) {
-    // The nodes may tell what one for them does not.
+    // The keyframe may fit the nodes of the stretch but not the condensed node.
     fused = attempt(arrived, placement, motion, parameters, {}, map);
     fused.took_stretch = true;
   }

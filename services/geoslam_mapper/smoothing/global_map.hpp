@@ -11,7 +11,7 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// The global map (GeoSLAM §4.3). Each part owns its state; this is their bundle.
+/// The global map (GeoSLAM §4.3). Each part owns its state; this struct bundles them.
 struct GlobalMap {
   LandmarkMap landmarks;
   PoseGraph graph;
@@ -24,8 +24,8 @@ struct GlobalMap {
   /// Whether there is neither a landmark nor a keyframe.
   bool empty() const { return landmarks.empty() && trajectory.bases().empty(); }
 
-  /// Takes over what the graph's updates moved since its checkpoint; returns the landmarks. Costs
-  /// what moved.
+  /// Copies the estimates that the graph's updates moved since its checkpoint into the landmarks;
+  /// returns these. Cost: the moved landmarks.
   std::vector<model::LandmarkId> adopt_estimates() {
     std::vector<model::LandmarkId> moved;
     for (const auto& [id, position_m] : graph.take_moved_landmarks()) {
@@ -36,12 +36,12 @@ struct GlobalMap {
     return moved;
   }
 
-  /// Takes these landmarks into the solved graph, where they are dormant. Ends a checkpoint.
+  /// Moves dormant ones of these landmarks into the solved graph. Ends a checkpoint.
   void wake(std::span<const model::LandmarkId> ids) {
     if (std::ranges::none_of(ids, [&](auto id) { return graph.is_dormant(id); })) return;
     graph.checkpoint();
     wake_unsolved(ids);
-    (void)graph.solve();  // What they tell was in the graph already.
+    (void)graph.solve();  // Their information was in the graph already.
     adopt_estimates();
   }
   /// Likewise, without solving.
@@ -51,15 +51,15 @@ struct GlobalMap {
     graph.wake(ids);
   }
 
-  /// Takes a landmark of the map that was given to begin with into the graph, with its prior.
-  /// Nothing where it is there already. The graph is not solved.
+  /// Adds a landmark of a given map to the graph, with its prior; does nothing if it is there
+  /// already. The graph is not solved.
   void enter_given(model::LandmarkId id) {
     const StoredLandmark& landmark = landmarks.at(id);
     if (!graph.position(id)) graph.add_landmark(id, landmark.position_m, landmark.prior_covariance);
   }
 
-  /// Takes all nodes into the solved graph, before something is joined that may move all of them.
-  /// Ends a checkpoint.
+  /// Moves all nodes into the solved graph, before a join that may move all of them. Ends a
+  /// checkpoint.
   void unfreeze() {
     if (graph.frozen_count() == 0) return;
     graph.checkpoint();

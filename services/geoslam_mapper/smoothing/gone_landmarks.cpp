@@ -9,10 +9,10 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// The gate's half width grows by what the map may have bent since the landmark was seen [m].
+/// Addition to the gate's half width for deformations of the map since the landmark was seen [m].
 constexpr double kBent_m = 0.1;
 
-/// A landmark that is not in use, and how far it is from what was observed [m].
+/// A landmark out of use, and its distance from the observation [m].
 struct Nearest {
   model::LandmarkId id = 0;
   double distance_m = 0.0;
@@ -50,7 +50,7 @@ std::vector<model::Association> name_gone(const model::Keyframe& keyframe,
   std::vector<bool> is_known(keyframe.landmarks.size(), false);
   for (const model::Association& pair : known) is_known[pair.keyframe_landmark] = true;
 
-  // Of several that are near one landmark the nearest.
+  // Of several observations near one landmark the nearest.
   std::map<model::LandmarkId, std::pair<double, std::uint32_t>> best;
   for (std::uint32_t i = 0; i < keyframe.landmarks.size(); ++i) {
     if (is_known[i]) continue;

@@ -1,4 +1,4 @@
-// Landmarks that are taken for gone, seen again.
+// New sightings of landmarks that are out of use.
 #pragma once
 
 #include <span>
@@ -10,10 +10,10 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// What of the keyframe is where a landmark stands that is not in use: each the nearest of the
-/// other, of one kind, within the association gate. `known`: what is associated already. Nothing is
-/// placed or fused by it; the existence tracker learns that the landmark may be there after all.
-/// O(keyframe's landmarks * landmarks not in use around).
+/// Pairs of keyframe landmarks and landmarks out of use at the same place: mutual nearest
+/// neighbours of one kind within the association gate. `known`: the landmarks associated already.
+/// The pairs are not used for localisation or fusion; they tell the existence tracker that the
+/// landmark may exist after all. O(keyframe's landmarks * landmarks out of use around).
 std::vector<model::Association> name_gone(const model::Keyframe& keyframe,
                                           const geometry::SE2& map_T_centre,
                                           std::span<const model::Association> known,

@@ -49,9 +49,9 @@ std::vector<Eigen::Matrix3d> PoseGraph::covariances(std::span<const NodeIndex> n
   return result;
 }
 
-/// What the uncertainty of the node that holds the graph adds to that of what lies around the
-/// newest one: the two together are exact there. What ties both sides of the holding node to each
-/// other makes it less than that node's own.
+/// Contribution of the holding node's uncertainty to the covariance around the newest node: the sum
+/// of both is exact there. It is less than the holding node's own covariance, since other factors
+/// tie both sides of that node to each other.
 Eigen::Matrix3d PoseGraph::anchor_covariance() const {
   if (!is_held_elsewhere()) return Eigen::Matrix3d::Zero();
   const plane::PoseId centre = nodes_[*newest_].centre;
@@ -66,7 +66,7 @@ Eigen::Matrix3d PoseGraph::anchor_covariance() const {
          solver.eigenvectors().transpose();
 }
 
-/// That of the holding node, as part of a node's.
+/// The holding node's covariance, transported to a node.
 Eigen::Matrix3d PoseGraph::of_anchor(const geometry::SE2& map_T_node,
                                      const Eigen::Matrix3d& anchor) const {
   if (anchor.isZero(0.0)) return anchor;
@@ -74,7 +74,7 @@ Eigen::Matrix3d PoseGraph::of_anchor(const geometry::SE2& map_T_node,
   return adjoint * anchor * adjoint.transpose();
 }
 
-/// Likewise of a point, frame `map`.
+/// Likewise to a point, frame `map`.
 Eigen::Matrix2d PoseGraph::of_anchor(const Eigen::Vector2d& position_m,
                                      const Eigen::Matrix3d& anchor) const {
   if (anchor.isZero(0.0)) return Eigen::Matrix2d::Zero();

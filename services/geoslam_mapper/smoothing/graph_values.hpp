@@ -1,4 +1,4 @@
-// What the pose graph is given and what it gives back, as values.
+// Input and output values of the pose graph.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,15 +12,16 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// So many landmarks that both observed hold a node to another one without a motion between them.
+/// This number of common landmarks ties two nodes without a motion between them.
 inline constexpr std::size_t kHold = 3;
 
-/// An observation that became another landmark's, as it was.
+/// An observation that was handed over to another landmark, in its original form.
 struct HandedOver {
   NodeIndex node = 0;
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();   ///< In the node's frame.
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();  ///< [1/m^2]
-  bool counts = true;  ///< False: the node observed both, and keeps the other observation alone.
+  bool counts =
+      true;  ///< False: the node observed both landmarks and keeps only the other observation.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -29,7 +30,7 @@ struct HandedOver {
   }
 };
 
-/// What a node observed of a landmark that is not in the solved graph.
+/// A node's observation of a landmark outside the solved graph.
 struct DormantObservation {
   NodeIndex node = 0;
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();   ///< In the node's frame.
@@ -42,16 +43,16 @@ struct DormantObservation {
   }
 };
 
-/// Landmarks that are kept elsewhere, and what stands for them in the graph.
+/// Landmarks that are stored elsewhere, and the motions that replace them in the graph.
 struct AwayLandmarks {
   std::vector<std::vector<DormantObservation>> observed;  ///< In the order of the ids.
-  std::vector<FrozenMotion> ties;                         ///< Of each two nodes, one.
+  std::vector<FrozenMotion> ties;                         ///< One per pair of nodes.
 };
 
-/// A node that holds the solved graph.
+/// A node that holds the solved graph fixed.
 struct Anchor {
   NodeIndex node = 0;
-  geometry::SE2 map_T_node;  ///< As it was when it began to hold the graph.
+  geometry::SE2 map_T_node;  ///< When it began to hold the graph.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -60,19 +61,19 @@ struct Anchor {
   }
 };
 
-/// A node to be taken out, and the node that gets what it observed.
+/// A node to remove, and the node that receives its observations.
 struct Retirement {
   NodeIndex node = 0;
   NodeIndex into = 0;
   geometry::SE2WithCovariance into_T_node;
 };
 
-/// What adds nothing to the map any more.
+/// Parts of the graph that add no information to the map.
 struct Surplus {
   std::vector<Retirement> nodes;
-  /// Nodes that stay for what they observed; the motions to them go.
+  /// Nodes that keep their observations but lose their motions.
   std::vector<NodeIndex> loose;
-  /// Pairs of nodes that stay; the motions between them go.
+  /// Pairs of nodes that stay but lose the motions between them.
   std::vector<std::pair<NodeIndex, NodeIndex>> motions;
 };
 

@@ -9,17 +9,17 @@ namespace {
 
 namespace plane = factor_graph::plane;
 
-/// Validity of one scalar: in this time the bias walks by a third of its smallest uncertainty.
+/// Duration of one scalar: in this time the bias walks by a third of its smallest uncertainty.
 constexpr model::Utime kValidity_us = 5'000'000;
-/// Scalars that may still lose their motions: those of the last keyframes.
+/// Number of newest scalars that may still lose their motions: those of the last keyframes.
 constexpr std::size_t kChain = 64;
-/// The variance of a prior that repeats part of what the graph still has. The motions taken out are
-/// three quarters and more of those that told it.
+/// Factor on the variance of a prior that repeats information still in the graph. The removed
+/// motions are at least three quarters of that information.
 constexpr double kRepeated = 1.3;
 
 double seconds(model::Utime duration) { return 1e-6 * static_cast<double>(duration); }
 
-/// The covariance with the gyro's variance for the rotation; correlations are kept.
+/// The covariance with the gyro's variance for the rotation, with the same correlations.
 Eigen::Matrix3d with_heading_variance(Eigen::Matrix3d covariance, double variance) {
   const double ratio = std::sqrt(variance / covariance(2, 2));
   covariance.row(2) *= ratio;
@@ -27,7 +27,7 @@ Eigen::Matrix3d with_heading_variance(Eigen::Matrix3d covariance, double varianc
   return covariance;
 }
 
-/// Adds the factor, in the place of one that is gone where there is such a place.
+/// Adds the factor, in a free place if there is one.
 template <typename Id, typename Factor>
 Id put(const Factor& factor, FreeNumbers& free, plane::Smoother& smoother) {
   const auto number = free.take();
@@ -74,7 +74,7 @@ void GyroBias::set_prior(Link& link, double mean, double information, plane::Smo
   }
 }
 
-/// A further one: the two are averaged.
+/// A further prior is averaged with the first.
 void GyroBias::add_prior(Link& link, double mean, double information, plane::Smoother& smoother) {
   if (!link.prior) return set_prior(link, mean, information, smoother);
   const plane::ScalarPrior& before = smoother.prior(*link.prior);
@@ -92,7 +92,7 @@ void GyroBias::set_step(Link& link, plane::ScalarId from, double information,
   }
 }
 
-/// Takes the link's own factors out.
+/// Removes the link's own factors.
 void GyroBias::clear(Link& link, plane::Smoother& smoother) {
   if (link.prior) {
     smoother.set(*link.prior, plane::ScalarPrior{link.id, 0.0, 0.0});
@@ -106,7 +106,7 @@ void GyroBias::clear(Link& link, plane::Smoother& smoother) {
   }
 }
 
-/// To the scalar that holds at this motion.
+/// Adds scalars up to the time of this motion.
 void GyroBias::go_on(const CentreMotion& motion, plane::Smoother& smoother) {
   if (now_.chain.empty()) {
     now_.reference = motion.odometry_bias;
@@ -128,7 +128,7 @@ plane::BiasedRelativePose GyroBias::biased(plane::RelativePose measured, const C
                                            plane::Smoother& smoother) {
   go_on(motion, smoother);
 
-  // As it would have been measured with the reference taken out.
+  // The rotation with the reference bias subtracted.
   const model::GyroRotation& gyro = *motion.gyro;
   const geometry::SE2 by_gyro(motion.from_T_to.mean.translation(), gyro.rotation_rad);
   measured.a_T_b =
@@ -153,7 +153,7 @@ void GyroBias::forget_motion(plane::ScalarId id) {
   }
 }
 
-/// What ties the next link to this one passes it by: variances of random walks add up.
+/// Ties the next link to the previous one: variances of random walks add up.
 void GyroBias::take_out(std::size_t at, plane::Smoother& smoother) {
   Link& link = now_.chain[at];
   Link& next = now_.chain[at + 1];

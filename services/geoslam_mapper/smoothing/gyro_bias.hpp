@@ -11,9 +11,9 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// A chain of scalars, one for 5 s each, tied to the one before by the bias's random walk. They
-/// count from odometry's own bias at the first motion, so they are small. Scalars whose motions are
-/// taken out of the graph again are taken out, too.
+/// A chain of scalars, one per 5 s, each tied to the previous one by the bias's random walk. They
+/// count from odometry's own bias at the first motion, so they are small. Scalars without motions
+/// in the graph are removed.
 class GyroBias {
  public:
   /// `walk`: random walk of the bias [rad/s/sqrt(s)]; 0 = the bias is not estimated.
@@ -23,37 +23,37 @@ class GyroBias {
   /// Whether the bias is a variable of the graph.
   bool is_estimated() const { return walk_ > 0.0; }
 
-  /// The motion between two poses with the bias as a third variable, to be added to the graph.
-  /// `measured` holds the two poses; its motion and information are those of `motion`, which must
-  /// have `gyro`. What the stops before it show is added to what the graph finds by itself; the
-  /// filter's bias is not used, it was learned from the same detections.
+  /// The motion between two poses with the bias as a third variable, for the graph. `measured`
+  /// holds the two poses; its motion and information are those of `motion`, which must have `gyro`.
+  /// The bias measured at the stops before the motion enters the graph, too; the filter's bias is
+  /// not used since it was estimated from the same detections.
   factor_graph::plane::BiasedRelativePose biased(factor_graph::plane::RelativePose measured,
                                                  const CentreMotion& motion,
                                                  factor_graph::plane::Smoother& smoother);
 
-  /// The bias as known now; none before the first motion.
+  /// The present bias; none before the first motion.
   struct Estimate {
-    double mean = 0.0;      ///< As the scalars count [rad/s].
+    double mean = 0.0;      ///< In the scalars' reference [rad/s].
     double variance = 0.0;  ///< [(rad/s)^2]
   };
-  /// The newest scalar's marginal.
+  /// Marginal of the newest scalar.
   std::optional<Estimate> estimate(const factor_graph::plane::Smoother& smoother) const;
-  /// A motion with this scalar was taken out of the graph.
+  /// A motion with this scalar was removed from the graph.
   void forget_motion(factor_graph::plane::ScalarId id);
-  /// What motions that were taken out had told of a scalar [rad/s, 1/(rad/s)^2] stays as a prior;
-  /// nothing where the scalar is not of the newest ones.
+  /// Keeps the information of removed motions on a scalar [rad/s, 1/(rad/s)^2] as a prior; does
+  /// nothing if the scalar is not one of the newest.
   void learned(factor_graph::plane::ScalarId id, double mean, double information,
                factor_graph::plane::Smoother& smoother);
-  /// Scalars without motion, but for the newest, go; what is known of them goes to the next ones.
+  /// Removes scalars without motion, except the newest; their information moves to the next ones.
   void drop_idle(factor_graph::plane::Smoother& smoother);
-  /// After motions were taken out: scalars without motion go, and the newest one keeps what had
-  /// been known of it, `before`, as a prior. What the motions that are still there had told is
-  /// counted twice then; the prior is weakened for it.
+  /// After motions were removed: removes scalars without motion, and keeps the previous estimate,
+  /// `before`, as a prior of the newest scalar. That counts the information of the remaining
+  /// motions twice; the prior is weakened for it.
   void keep(const Estimate& before, factor_graph::plane::Smoother& smoother);
 
-  /// Undo, as of the graph.
+  /// Checkpoint, as of the graph.
   void checkpoint();
-  /// Likewise.
+  /// Rollback, as of the graph.
   void rollback();
 
   /// Members of a saved state; see common/state. The walk is configuration.
@@ -67,8 +67,8 @@ class GyroBias {
   struct Link {
     factor_graph::plane::ScalarId id{};
     model::Utime since = 0;
-    std::uint32_t motions = 0;                                ///< That have it.
-    std::optional<factor_graph::plane::ScalarPriorId> prior;  ///< Its own.
+    std::uint32_t motions = 0;                                ///< Number of motions with it.
+    std::optional<factor_graph::plane::ScalarPriorId> prior;  ///< The scalar's own prior.
     std::optional<factor_graph::plane::ScalarStepId> step;    ///< From the link before.
 
     template <class Archive, class Self>
@@ -77,7 +77,7 @@ class GyroBias {
     }
   };
   struct State {
-    double reference = 0.0;   ///< From which the scalars count [rad/s].
+    double reference = 0.0;   ///< Zero of the scalars [rad/s].
     std::vector<Link> chain;  ///< The newest ones; older ones stay in the graph as they are.
 
     template <class Archive, class Self>
@@ -100,7 +100,7 @@ class GyroBias {
   double walk_;         ///< [rad/s/sqrt(s)]
   double start_sigma_;  ///< [rad/s]
   State now_;
-  State saved_;  ///< At the checkpoint.
+  State saved_;  ///< State at the checkpoint.
   FreeNumbers free_scalars_;
   FreeNumbers free_priors_;
   FreeNumbers free_steps_;

@@ -7,10 +7,10 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// The index serves search and gating only: following every millimetre costs more than it gives.
-/// Most moves are small rotations of whole stretches of the map. Where the index follows one, its
-/// triangles wait for the next search: each would cost a triangulation, and a loop that closes
-/// moves all landmarks again and again.
+/// The index is for search and gating only: following every millimetre would cost more than it
+/// gains. Most moves are small rotations of whole stretches of the map. After an update of the
+/// index the triangles wait for the next search: each needs a triangulation, and a closing loop
+/// moves all landmarks repeatedly.
 constexpr double kIndexTolerance_m = 0.01;
 
 }  // namespace
@@ -106,8 +106,8 @@ void LandmarkMap::move(model::LandmarkId id, const Eigen::Vector2d& position_m) 
   }
 }
 
-/// Keeps the first entry of each landmark that is late. Where landmarks are given away all along
-/// a drive and nothing needs the index up to date, entries of those that are gone would add up.
+/// Keeps the first entry of each landmark that is late. If landmarks are handed over all along a
+/// drive and the index is never brought up to date, entries of removed landmarks would accumulate.
 void LandmarkMap::forget_gone_late() {
   std::erase_if(late_, [&](model::LandmarkId id) {
     const auto found = landmarks_.find(id);

@@ -1,4 +1,4 @@
-// All that a graph measured, without a solver: to become part of another graph.
+// All measurements of a graph, without a solver, to be added to another graph.
 #pragma once
 
 #include <map>
@@ -8,12 +8,12 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// The nodes of a graph and what was measured of them, in the graph's own frame.
+/// Nodes of a graph and their measurements, in the graph's own frame.
 struct LooseGraph {
   /// A node by its number.
   struct LooseNode {
     geometry::SE2 pose;
-    Node node;             ///< Without observations and motions; `centre` means nothing.
+    Node node;             ///< Without observations and motions; `centre` is not used.
     bool is_free = false;  ///< The number has no node.
   };
   /// A landmark of the solved graph.
@@ -25,9 +25,9 @@ struct LooseGraph {
   std::vector<LooseNode> nodes;
   std::map<model::LandmarkId, LooseLandmark> solved;
   std::map<model::LandmarkId, std::vector<DormantObservation>> dormant;
-  /// Of landmarks of a given map: what was given, in the frame of the map.
+  /// Priors of landmarks of a given map, in the frame of the map.
   std::map<model::LandmarkId, DormantObservation> given;
-  /// With the gyro's bias as it is known in the end.
+  /// With the latest estimate of the gyro's bias.
   std::vector<FrozenMotion> motions;
 };
 

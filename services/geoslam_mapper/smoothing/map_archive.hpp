@@ -1,4 +1,4 @@
-// Maps that were left.
+// Earlier maps that are no longer in use.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,12 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// A map that is not continued: nothing changes it any more.
+/// A map that is not continued: it changes no more.
 struct KeptMap {
   std::uint32_t id = 0;                        ///< Upper 16 bit of its landmarks' ids.
   std::vector<model::MapLandmark> landmarks;   ///< In order of id, with covariances; its own frame.
   std::vector<model::KeyframePose> keyframes;  ///< In order of time, likewise.
-  /// Its graph with all that was observed, as common/state writes it; empty in older ones.
+  /// Its graph with all observations, in the format of common/state; empty in older maps.
   std::string whole;
 
   /// Members of a saved state; see common/state.
@@ -28,28 +28,28 @@ struct KeptMap {
   }
 };
 
-/// All that is worth keeping where a map is left. Costs about two factorisations.
+/// Makes the archive entry of a map. Cost: about two factorisations.
 KeptMap keep(const GlobalMap& map, const CommonError& common);
-/// The map as it was kept, with its graph, which it must have. Costs about one factorisation.
+/// Restores a map from its entry, which must have the graph. Cost: about one factorisation.
 GlobalMap opened(const KeptMap& kept, const SmoothingMapperParameters& parameters);
 
-/// The maps that were left, the oldest first. Bounded: a landmark takes 80 bytes, a keyframe 112;
-/// the newest kMostWhole have their graph, too (some 200 bytes per observation). Older ones are
-/// landmarks and trajectory, and the oldest are forgotten where there are too many.
+/// The earlier maps, the oldest first. Bounded: a landmark takes 80 bytes, a keyframe 112; the
+/// newest kMostWhole also have their graph (some 200 bytes per observation). Older ones have
+/// landmarks and trajectory only; beyond the limits the oldest are deleted.
 class MapArchive {
  public:
   static constexpr std::size_t kMost = 16;            ///< Maps.
   static constexpr std::size_t kMostWhole = 2;        ///< Maps that have their graph.
   static constexpr std::size_t kMostParts = 200'000;  ///< Landmarks and keyframes of all maps.
 
-  /// Adds the newest. Returns the maps that were forgotten for it, ascending: their ids are to be
+  /// Adds the newest map. Returns the maps that were deleted for it, ascending: their ids are to be
   /// announced.
   std::vector<std::uint32_t> add(KeptMap map);
-  /// The map is kept no more: it is part of another one.
+  /// Removes a map that became part of another one.
   void remove(std::uint32_t id) {
     std::erase_if(maps_, [&](const KeptMap& map) { return map.id == id; });
   }
-  /// What is kept, in order of id.
+  /// The maps, in order of id.
   const std::deque<KeptMap>& maps() const { return maps_; }
 
   /// Members of a saved state; see common/state.

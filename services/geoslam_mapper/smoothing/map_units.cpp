@@ -5,7 +5,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Change of the factor that is a step: 3 cm at 300 m.
+/// Least change of the factor that makes a step: 3 cm at 300 m.
 constexpr double kStep = 1e-4;
 
 }  // namespace

@@ -8,13 +8,13 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Squared Mahalanobis distance of two sets of observations of one landmark (2 degrees of freedom)
-/// beyond which they are of two. By chance one in 3e6.
+/// Squared Mahalanobis distance between two sets of observations (2 degrees of freedom) above which
+/// they are of two landmarks. Exceeded by chance once in 3e6.
 constexpr double kContradiction = 30.0;
-/// Pairs that are not merged again.
+/// Number of separated pairs that are remembered.
 constexpr std::size_t kMostSeparated = 256;
 
-/// Mean of a landmark's observations, with the poses as they are.
+/// Mean of a landmark's observations, at the present poses.
 class MeanPosition {
  public:
   void add(const geometry::SE2& map_T_node, const Eigen::Vector2d& position_m,
@@ -79,7 +79,7 @@ void Merges::adopt(const MergedPair& pair, std::vector<HandedOver> observed, Glo
   merges_.push_back({std::move(old_one), pair.second, std::move(observed)});
 }
 
-/// What the map knows of the two beside the graph.
+/// Merges the data of the two in the map, beside the graph.
 void Merges::join(const MergedPair& pair, GlobalMap& map) {
   for (Merge& merge : merges_)
     if (merge.into == pair.first) merge.into = pair.second;
@@ -106,7 +106,8 @@ bool Merges::were_separated(model::LandmarkId a, model::LandmarkId b) const {
   return std::find(separated_.begin(), separated_.end(), pair) != separated_.end();
 }
 
-/// The worst one only: what is wrong bends what is right beside it, until the graph is solved.
+/// Separates only the worst one: until the graph is solved, a wrong merge also distorts correct
+/// ones around it.
 std::optional<model::LandmarkId> Merges::take_back(std::span<const model::Association> touched,
                                                    GlobalMap& map) {
   auto worst = merges_.end();
@@ -128,8 +129,8 @@ std::optional<model::LandmarkId> Merges::take_back(std::span<const model::Associ
   return separate(merge, map);
 }
 
-/// Squared Mahalanobis distance of the means of the old landmark's observations and of all others
-/// of the joined one, in units of their scatter where that is larger than stated.
+/// Squared Mahalanobis distance between the mean of the old landmark's observations and that of all
+/// others, in units of their scatter if that is larger than stated.
 double Merges::contradiction(const Merge& merge, const GlobalMap& map) {
   MeanPosition before;
   MeanPosition others;
@@ -152,14 +153,14 @@ double Merges::contradiction(const Merge& merge, const GlobalMap& map) {
   return apart.dot(covariance.inverse() * apart) / std::max(1.0, scatter);
 }
 
-/// The old landmark under a new id: an id that is gone never comes back.
+/// Restores the old landmark with a new id: ids are never reused.
 model::LandmarkId Merges::separate(const Merge& merge, GlobalMap& map) {
   StoredLandmark old_one = merge.old_one;
   StoredLandmark& joined = map.landmarks.at(merge.into);
   joined.information = std::max(joined.information - old_one.information, 1e-6);
   joined.observation_count -= std::min(joined.observation_count, old_one.observation_count);
 
-  // The observations go back.
+  // Returns the observations.
   MeanPosition position;
   for (const HandedOver& one : merge.observed)
     position.add(map.graph.pose(one.node), one.position_m, one.information);
@@ -171,7 +172,7 @@ model::LandmarkId Merges::separate(const Merge& merge, GlobalMap& map) {
     return !map.graph.node(node).observations().contains(merge.into);
   });
 
-  // The two are not merged again.
+  // Prevents a second merge of the two.
   if (separated_.size() == kMostSeparated) separated_.erase(separated_.begin());
   separated_.emplace_back(std::min(id, merge.into), std::max(id, merge.into));
   return id;

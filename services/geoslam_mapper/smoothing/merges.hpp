@@ -1,4 +1,4 @@
-// Landmarks that were made one, and taking that back.
+// Merges of landmarks, and their undo.
 #pragma once
 
 #include <optional>
@@ -11,40 +11,40 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Two landmarks, the first of which became the second.
+/// Two landmarks; the first was merged into the second.
 using MergedPair = std::pair<model::LandmarkId, model::LandmarkId>;
 
-/// Joins landmarks, and keeps for a while what each of them had been observed as: where later
-/// observations tell two landmarks, they are separated again. What was handed over to another node
-/// since, or added to, stays.
+/// Merges landmarks, and keeps the separate observations for a while: if later observations show
+/// two landmarks, they are separated again. Observations that were since handed over to another
+/// node, or averaged with others, stay merged.
 class Merges {
  public:
-  /// Most merges that can be taken back.
+  /// Most merges that can be undone.
   static constexpr std::size_t kMost = 2048;
 
-  /// The one of two landmarks that stays: that of a given map, which has a prior; else the one with
-  /// more observations.
+  /// Order of a merge: the landmark that stays (second) is the one of a given map, which has a
+  /// prior; else the one with more observations.
   static MergedPair in_order(model::LandmarkId a, model::LandmarkId b, const LandmarkMap& map);
 
-  /// Makes the first landmark of the pair the second, in graph and map; both are in the graph. The
-  /// graph is not solved. `is_final`: that it is one thing does not rest on how near the two are.
+  /// Merges the first landmark of the pair into the second, in graph and map; both are in the
+  /// graph. The graph is not solved. `is_final`: the decision does not depend on their distance.
   void merge(const MergedPair& pair, bool is_final, GlobalMap& map);
-  /// The same where what was observed of the two contradicts that they are one point, but nothing
-  /// else can be: a thing that looks elsewhere from another side. What the first one was observed
-  /// as does not count.
+  /// Likewise for two landmarks whose observations contradict one point although there can be only
+  /// one object, such as one that looks different from another side. The observations of the first
+  /// are ignored.
   void absorb(const MergedPair& pair, GlobalMap& map);
-  /// The same as merge() where the graph has done it: `observed` is what it handed over.
+  /// Likewise after the graph has merged them: `observed` are the observations it handed over.
   void adopt(const MergedPair& pair, std::vector<HandedOver> observed, GlobalMap& map);
-  /// Whether the two were one and were separated.
+  /// Whether the two were merged once and separated.
   bool were_separated(model::LandmarkId a, model::LandmarkId b) const;
 
-  /// Separates the one of the touched landmarks whose observations from before and after a merge
-  /// contradict each other most, if any do; returns the new landmark. The graph is not solved.
-  /// Cost: the observations of those that were merged.
+  /// Separates the touched landmark whose observations from before and after a merge contradict
+  /// each other most, if any do; returns the new landmark. The graph is not solved. Cost: the
+  /// observations of the merged landmarks.
   std::optional<model::LandmarkId> take_back(std::span<const model::Association> touched,
                                              GlobalMap& map);
 
-  /// What a node that is taken out of the graph observed is another one's now.
+  /// A node leaves the graph: its observations belong to another one now.
   void hand_over(NodeIndex node);
 
   /// Members of a saved state; see common/state.
@@ -55,7 +55,7 @@ class Merges {
 
  private:
   struct Merge {
-    StoredLandmark old_one;  ///< As it was.
+    StoredLandmark old_one;  ///< Before the merge.
     model::LandmarkId into = 0;
     std::vector<HandedOver> observed;
 
@@ -69,7 +69,7 @@ class Merges {
   model::LandmarkId separate(const Merge& merge, GlobalMap& map);
 
   std::vector<Merge> merges_;          ///< In order of time.
-  std::vector<MergedPair> separated_;  ///< Ids now, smaller first.
+  std::vector<MergedPair> separated_;  ///< Present ids, smaller first.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

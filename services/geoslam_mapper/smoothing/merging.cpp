@@ -8,10 +8,10 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Landmarks, beside those that it observed, around which a keyframe looks for doubles.
+/// Most landmarks, beside the observed ones, around which one keyframe searches for doubles.
 constexpr std::size_t kWaitingPerKeyframe = 32;
 
-/// The dormant ones of these landmarks, and what may be the same as they are.
+/// Those of these landmarks that are dormant, and dormant ones that may be the same landmark.
 std::vector<model::LandmarkId> with_neighbours(std::span<const model::LandmarkId> ids,
                                                double distance_m, const GlobalMap& map) {
   std::vector<model::LandmarkId> result;
@@ -24,7 +24,7 @@ std::vector<model::LandmarkId> with_neighbours(std::span<const model::LandmarkId
   return result;
 }
 
-/// Those of the given map that may be the same as these landmarks and are not in the graph yet.
+/// Landmarks of the given map that may be the same as these and are not in the graph yet.
 std::vector<model::LandmarkId> given_beside(std::span<const model::LandmarkId> ids,
                                             double distance_m, const GlobalMap& map) {
   if (!map.landmarks.has_given()) return {};
@@ -40,12 +40,12 @@ std::vector<model::LandmarkId> given_beside(std::span<const model::LandmarkId> i
   return result;
 }
 
-/// Into the solved graph.
+/// Adds them to the solved graph.
 void enter(std::span<const model::LandmarkId> given, GlobalMap& map) {
   if (given.empty()) return;
   map.graph.checkpoint();
   for (const model::LandmarkId id : given) map.enter_given(id);
-  (void)map.graph.solve();  // Nothing moves: no keyframe saw them.
+  (void)map.graph.solve();  // Moves nothing: no keyframe observed them.
   map.adopt_estimates();
 }
 
@@ -53,17 +53,17 @@ void enter(std::span<const model::LandmarkId> given, GlobalMap& map) {
 
 MergingResult Merging::follow(const FusedKeyframe& fused,
                               std::span<const model::Association> touched, GlobalMap& map) {
-  // What contradicts itself.
+  // Separates contradicting landmarks.
   MergingResult result;
   result.separated = merges_.take_back(touched, map);
   if (result.separated && map.graph.solve().ok) map.adopt_estimates();
 
-  // An earlier pass.
+  // Joins an earlier pass.
   JoinedPasses joined = pass_joiner_.follow(fused.keyframe.field_of_view, fused.node, merges_, map);
   result.merged = std::move(joined.pairs);
   waiting_.insert(waiting_.end(), joined.moved.begin(), joined.moved.end());
 
-  // Single doubles.
+  // Merges single doubles.
   const std::vector<model::LandmarkId> ids = to_look_at(touched);
   map.wake(with_neighbours(ids, parameters_.merge_distance_m, map));
   enter(given_beside(ids, parameters_.merge_distance_m, map), map);

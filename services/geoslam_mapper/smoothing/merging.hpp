@@ -1,4 +1,4 @@
-// One landmark for one trunk: what is found to be the same is joined, what is not is separated.
+// One landmark per trunk: merges doubles and separates wrong merges.
 #pragma once
 
 #include <optional>
@@ -12,28 +12,30 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// What a keyframe made one, and what it separated.
+/// Landmarks that a keyframe merged and separated.
 struct MergingResult {
   std::vector<MergedPair> merged;
   std::optional<model::LandmarkId> separated;  ///< A new landmark.
 };
 
-/// After each keyframe: separates what its observations contradict most, joins this pass with
-/// earlier ones, and merges doubles around what the keyframe observed and what a joined pass moved.
+/// After each keyframe: separates the landmark with the strongest contradiction, joins this pass
+/// with earlier ones, and merges doubles around the observed landmarks and around those that a join
+/// moved.
 class Merging {
  public:
-  /// `parameters` gives the gates and the distance within which doubles are looked for.
+  /// `parameters` gives the gates and the search radius for doubles.
   explicit Merging(const SmoothingMapperParameters& parameters)
       : parameters_(parameters), pass_joiner_(parameters) {}
 
-  /// `touched`: the associations of the keyframe that was fused. Cost: what is around it.
+  /// `touched`: the associations of the fused keyframe. Cost: the landmarks around it.
   MergingResult follow(const FusedKeyframe& fused, std::span<const model::Association> touched,
                        GlobalMap& map);
 
-  /// Makes the pairs one, all or none; see PassJoiner::join(). What moves is looked at later.
+  /// Merges all the pairs or none; see PassJoiner::join(). Moved landmarks are checked at later
+  /// keyframes.
   std::vector<MergedPair> join(std::vector<MergedPair> pairs, GlobalMap& map);
 
-  /// What was merged so far, for nodes that are taken out.
+  /// The merges so far, for nodes that leave the graph.
   Merges& merges() { return merges_; }
 
   /// Members of a saved state; see common/state.
@@ -48,7 +50,7 @@ class Merging {
   SmoothingMapperParameters parameters_;
   Merges merges_;
   PassJoiner pass_joiner_;
-  std::vector<model::LandmarkId> waiting_;  ///< Moved by a joined pass, not looked at yet.
+  std::vector<model::LandmarkId> waiting_;  ///< Moved by a join, not checked yet.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -67,10 +67,10 @@ std::optional<Prediction> Motion::predict(const model::Keyframe& keyframe,
       compound({map_T_last_base_->mean * motion.mean, motion.covariance}, base_T_centre), false};
 }
 
-/// From the keyframe's first member to its centre by the gyro. The keyframe's gauge leaves the
-/// members' errors without a mean. So the centre is where the gyro has the members' mean: the
-/// landmarks' share in rotations within the keyframe does not enter, and is not taken for the
-/// gyro's bias.
+/// Rotation from the keyframe's first member to its centre by the gyro. The gauge of the keyframe
+/// fixes the members' errors to zero mean. So the centre is placed at the members' mean by the
+/// gyro: then the landmarks' part of rotations within the keyframe is not taken for a bias of the
+/// gyro.
 std::optional<model::GyroRotation> Motion::rotation_to_centre(
     const model::Keyframe& keyframe) const {
   model::GyroRotation mean;
@@ -87,7 +87,7 @@ std::optional<model::GyroRotation> Motion::rotation_to_centre(
                              share * mean.seconds, share * mean.bias_rad};
 }
 
-/// None also where nothing was measured on the move.
+/// None also if the vehicle was stationary all the time.
 std::optional<model::GyroRotation> Motion::rotation_since_last_centre(
     const model::Keyframe& keyframe) const {
   if (!last_member_->rotation) return std::nullopt;
@@ -129,11 +129,12 @@ bool Motion::knows_heading(const model::Keyframe& keyframe) const {
 
 void Motion::continue_from(const model::Keyframe& keyframe, const Base& base,
                            const geometry::SE2WithCovariance& map_T_base) {
-  // What the stops showed is in the graph with the first motion after them.
+  // The bias from stops is in the graph with the first motion after them.
   if (last_member_ && base.node != last_member_->node && rotation_since_last_centre(keyframe))
     stops_.clear();
 
-  // A folded keyframe's members are given in its own centre; the base ties that to the node's.
+  // The members of a folded keyframe are in its own centre frame; the base ties that frame to the
+  // node's.
   const model::KeyframeMember& last = keyframe.members.back();
   const geometry::SE2 node_T_keyframe =
       base.centre_T_base.mean * keyframe.centre_T_base().inverse();

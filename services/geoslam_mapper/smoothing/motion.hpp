@@ -1,4 +1,4 @@
-// How the vehicle moved since the last keyframe, by odometry and by the filter.
+// Motion of the vehicle since the last keyframe, by odometry and by the filter.
 #pragma once
 
 #include <optional>
@@ -20,7 +20,7 @@ struct LastMember {
   NodeIndex node = 0;
   model::Utime utime = 0;
   geometry::SE2WithCovariance centre_T_vehicle;
-  std::optional<model::GyroRotation> rotation;  ///< From the centre to here, by the gyro.
+  std::optional<model::GyroRotation> rotation;  ///< From the centre to this member, by the gyro.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -30,40 +30,39 @@ struct LastMember {
 };
 
 /// Odometry since the last accepted keyframe, the filter's recent poses, and the pose from which
-/// both go on. The gyro's bias as a variable is in the graph (GyroBias): a refused keyframe takes
-/// it back together with the graph.
+/// both continue. The gyro's bias is a variable of the graph (GyroBias): a refused keyframe rolls
+/// it back with the graph.
 class Motion {
  public:
   /// No odometry yet. `parameters` gives `use_odometry`, `gyro_walk`, the noise of predictions
   /// without odometry and `start_heading_sigma_rad`.
   explicit Motion(const SmoothingMapperParameters& parameters);
 
-  /// The same odometry and filter, before any keyframe: for a map that begins now.
+  /// The same odometry and filter before any keyframe, for a new map.
   Motion from_nowhere() const;
 
   /// Adds an odometry increment, if the configuration uses odometry.
   void add(const model::Odometry& increment);
-  /// Adds the filter's pose: a gate. Where there are no wheels, its velocity serves odometry.
+  /// Adds the filter's pose as a gate. Without wheels, odometry uses its velocity.
   void add(const model::EkfPose& pose);
 
-  /// Where the keyframe's centre should be: by odometry from the last accepted keyframe, else by
-  /// the keyframer's track from the last one. None where neither reaches it.
+  /// Predicted pose of the keyframe's centre: by odometry from the last accepted keyframe, else by
+  /// the keyframer's track from the last one. None if neither covers the time since then.
   std::optional<Prediction> predict(const model::Keyframe& keyframe, const PoseGraph& graph) const;
-  /// Odometry from the last accepted keyframe's centre to the centre of this one; none where
-  /// odometry has a gap.
+  /// Odometry from the last accepted keyframe's centre to this one's; none if odometry has a gap.
   std::optional<CentreMotion> since_last_centre(const model::Keyframe& keyframe) const;
   /// Odometry between two times (right perturbation); none without odometry or with a gap.
   std::optional<geometry::SE2WithCovariance> between(model::Utime from, model::Utime to) const;
-  /// The same by the IMU alone; none also where a time is not the end of an increment.
+  /// Likewise by the IMU alone; none also if a time is not the end of an increment.
   std::optional<model::InertialMotion> inertial(model::Utime from, model::Utime to) const;
-  /// Whether an IMU ties both ends of the keyframe to a heading within
-  /// `start_heading_sigma_rad`; true also where there is no IMU to wait for.
+  /// Whether an IMU gives the keyframe's heading to within `start_heading_sigma_rad` at both ends;
+  /// true also without an IMU.
   bool knows_heading(const model::Keyframe& keyframe) const;
 
-  /// An accepted keyframe with its base: odometry goes on from its last member.
+  /// After an accepted keyframe with its base: odometry continues from its last member.
   void continue_from(const model::Keyframe& keyframe, const Base& base,
                      const geometry::SE2WithCovariance& map_T_base);
-  /// A keyframe that found no place: its prediction serves the next one.
+  /// After a keyframe that was not localised: its prediction is the start of the next one's.
   void assume(const model::Keyframe& keyframe, const Prediction& prediction);
 
   /// The last accepted keyframe's last member in the frame of its node; none before the first.

@@ -24,24 +24,25 @@ struct MotionRef {
   }
 };
 
-/// The centre of one keyframe, or of several that were folded together. What it has in the solved
-/// graph takes room only where there is any: all but some tens of a long drive's nodes have none,
-/// and take 32 bytes each.
+/// The centre of one keyframe, or of several that were folded together. Memory for observations and
+/// motions is allocated only if there are any: all but some tens of the nodes of a long drive have
+/// none and take 32 bytes each.
 class Node {
  public:
-  /// Each observed landmark's factor in the graph.
+  /// The factor in the graph of each observed landmark.
   using Observations = std::map<model::LandmarkId, factor_graph::plane::ObservationId>;
-  /// That begin or end at the node.
+  /// Motions that begin or end at the node.
   using Motions = std::vector<MotionRef>;
 
   factor_graph::plane::PoseId centre{};
-  bool is_stationary = false;  ///< The vehicle was stationary during the keyframe.
-  bool is_condensed = false;   ///< The nodes of a stretch of the path in one.
-  double along_m = 0.0;        ///< Path of the vehicle up to here.
-  double keyframes = 1.0;      ///< Whose observations it has; those of retired nodes, too.
+  bool is_stationary = false;  ///< Of the vehicle, during the keyframe.
+  bool is_condensed = false;   ///< The node replaces the nodes of a stretch of the path.
+  double along_m = 0.0;        ///< Path length of the vehicle up to here.
+  double keyframes =
+      1.0;  ///< Number of keyframes whose observations it has, including those of removed nodes.
 
   Node() = default;
-  /// One that has observed nothing yet.
+  /// A node without observations.
   Node(factor_graph::plane::PoseId its_centre, bool stationary, double its_along_m)
       : centre(its_centre), is_stationary(stationary), along_m(its_along_m) {}
   Node(Node&&) noexcept = default;
@@ -59,15 +60,15 @@ class Node {
   }
   ~Node() = default;
 
-  /// What it observed.
+  /// Its observations.
   const Observations& observations() const { return solved().observations; }
-  /// How it moved.
+  /// Its motions.
   const Motions& motions() const { return solved().motions; }
-  /// The same for change. The room that this takes stays until give_room_back().
+  /// Mutable observations. Their memory stays allocated until give_room_back().
   Observations& edit_observations() { return make().observations; }
   /// Likewise.
   Motions& edit_motions() { return make().motions; }
-  /// Takes no room for what there is none of.
+  /// Frees the memory of empty containers.
   void give_room_back() {
     if (observations().empty() && motions().empty()) solved_.reset();
   }
@@ -88,7 +89,7 @@ class Node {
   }
 
  private:
-  /// What the solved graph has of it.
+  /// Its factors in the solved graph.
   struct Solved {
     Observations observations;
     Motions motions;

@@ -1,4 +1,4 @@
-// Many nodes of the graph in one.
+// Condenses nodes of the graph into one.
 #include <Eigen/LU>
 #include <algorithm>
 #include <map>
@@ -31,7 +31,7 @@ std::vector<Retirement> PoseGraph::condense(std::span<const NodeIndex> nodes) {
   const Part& part = ahead.part;
   const plane::CondensedPart* const condensed = &ahead.condensed;
 
-  // One node comes, then the others go: it gets a number that none of them has.
+  // Adds the new node before the others are removed: its number differs from theirs.
   const double along_m = nodes_[part.inner[part.inner.size() / 2]].along_m;
   const NodeIndex into = put_node(condensed->map_T_origin, false, along_m);
   double keyframes = 0.0;
@@ -42,7 +42,7 @@ std::vector<Retirement> PoseGraph::condense(std::span<const NodeIndex> nodes) {
     begin_motion_at(into, part.outer[i], condensed->outer[i]);
   for (const NodeIndex node : part.inner) take_out(node);
 
-  // What they measured.
+  // Their observations.
   for (std::size_t i = 0; i < part.landmarks.size(); ++i) {
     const plane::CondensedPoint& point = condensed->points[i];
     observe(into, part.landmarks[i], point.position, point.covariance.inverse());
@@ -84,7 +84,7 @@ PoseGraph::Part PoseGraph::part_of(std::span<const NodeIndex> nodes) const {
   return part;
 }
 
-/// Those that end at the node, and those that leave the part.
+/// Motions that end at the node, and motions that leave the part.
 void PoseGraph::add_motions_of(NodeIndex node, Part& part) const {
   const auto number_of = [&](NodeIndex one) {
     return static_cast<std::size_t>(std::find(part.inner.begin(), part.inner.end(), one) -
@@ -123,7 +123,8 @@ void PoseGraph::add_motion(MotionRef ref, plane::PoseId a, plane::PoseId b, Part
   part.graph.biased_relative_poses.push_back(factor);
 }
 
-/// A motion between an outer node and one of the part, between the outer node and `into` now.
+/// Replaces a motion between an outer node and a node of the part by one between the outer node and
+/// `into`.
 void PoseGraph::begin_motion_at(NodeIndex into, const Part::Outer& outer,
                                 const plane::CondensedMotion& condensed) {
   const bool is_forward = ends_of(outer.motion).first == outer.inner;
@@ -134,7 +135,7 @@ void PoseGraph::begin_motion_at(NodeIndex into, const Part::Outer& outer,
   if (!is_forward) std::swap(measured.a, measured.b);
 
   if (outer.motion.is_biased) {
-    // As it would have been measured with the bias as it is.
+    // The motion with the present bias subtracted.
     const auto id = plane::BiasedMotionId(outer.motion.number);
     const plane::ScalarId bias = smoother_.motion(id).bias;
     const double seconds = is_forward ? condensed.seconds : -condensed.seconds;
@@ -147,7 +148,7 @@ void PoseGraph::begin_motion_at(NodeIndex into, const Part::Outer& outer,
   edit(into).edit_motions().push_back(outer.motion);
 }
 
-/// The node with all that it observed, and its motions to others of its part.
+/// Removes the node with its observations and its motions to others of its part.
 void PoseGraph::take_out(NodeIndex node) {
   for (const auto& [id, number] : nodes_[node].observations()) {
     plane::PointObservation nothing = smoother_.observation(number);

@@ -1,4 +1,4 @@
-// Taking nodes out of the graph where another one has their place.
+// Removes nodes for which another node takes over.
 #include <Eigen/LU>
 #include <algorithm>
 #include <utility>
@@ -33,9 +33,9 @@ void PoseGraph::take_out(const Surplus& surplus) {
   if (bias && free_biased_.size() != biased_before) gyro_.keep(*bias, smoother_);
 }
 
-/// Each with the uncertainty of where the two nodes are to each other. The sum of two nodes' whole
-/// information is exact where both observed the same: what told where a node was is not told about
-/// the landmarks, and the other node is loose, too.
+/// The covariance of each observation includes that of the relative pose of the two nodes. Adding
+/// up two nodes' full information is exact if both observed the same landmarks: information on a
+/// node's pose is not information on the landmarks, and the other node is loose, too.
 void PoseGraph::hand_observations_to(const Retirement& retirement) {
   Node& node = edit(retirement.node);
   const geometry::SE2& into_T_node = retirement.into_T_node.mean;
@@ -80,16 +80,16 @@ bool PoseGraph::leads_away(NodeIndex node, NodeIndex from, NodeIndex to,
   return from == node && stays_tied(to, surplus) && nodes_[to].along_m > nodes_[node].along_m;
 }
 
-/// Whether the motion, taken out of `from`, comes from an earlier node that hangs on its motions:
-/// where the vehicle comes back from unknown ground, this one closes the loop. A node that other
-/// motions no more lead to was made loose itself.
+/// Whether the motion, removed from `from`, comes from an earlier node that depends on its motions:
+/// when the vehicle returns from unknown ground, this motion closes the loop. An earlier node
+/// without other motions was made loose itself.
 bool PoseGraph::leads_in(NodeIndex node, NodeIndex from, NodeIndex to,
                          const Surplus& surplus) const {
   return to == node && stays_tied(from, surplus) && !nodes_[from].motions().empty() &&
          nodes_[from].along_m < nodes_[node].along_m;
 }
 
-/// Motions between the node and those that stay tied are kept.
+/// Keeps motions between the node and nodes that stay tied, removes the others.
 void PoseGraph::loosen(NodeIndex node, const Surplus& surplus) {
   const std::vector<MotionRef> motions = nodes_[node].motions();
   for (const MotionRef ref : motions) {
@@ -125,7 +125,7 @@ void PoseGraph::take_motions_out(NodeIndex a, NodeIndex b) {
   }
 }
 
-/// Takes it out; the motion as it is with the bias as known now.
+/// Removes the motion and returns it with the present bias.
 plane::RelativePose PoseGraph::take_motion_out(MotionRef ref) {
   if (!ref.is_biased) {
     plane::RelativePose measured = smoother_.motion(plane::MotionId(ref.number));

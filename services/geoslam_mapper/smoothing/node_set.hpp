@@ -1,4 +1,4 @@
-// A set of nodes in one bit for each node there ever was.
+// A set of nodes, one bit per node number ever used.
 #pragma once
 
 #include <cstddef>
@@ -12,25 +12,25 @@ namespace understory::geoslam_mapper::smoothing {
 /// Nodes by their numbers.
 class NodeSet {
  public:
-  /// Whether the node is in it.
+  /// Whether the set has the node.
   bool contains(NodeIndex node) const { return node < is_in_.size() && is_in_[node]; }
-  /// Adds it.
+  /// Adds a node.
   void insert(NodeIndex node) {
     if (contains(node)) return;
     if (is_in_.size() <= node) is_in_.resize(node + 1);
     is_in_[node] = true;
     ++size_;
   }
-  /// Takes it out. False where it was not in it.
+  /// Removes a node. False if it was not in the set.
   bool erase(NodeIndex node) {
     if (!contains(node)) return false;
     is_in_[node] = false;
     --size_;
     return true;
   }
-  /// How many there are.
+  /// Number of nodes.
   std::size_t size() const { return size_; }
-  /// All of them, ascending. O(largest number).
+  /// All nodes, ascending. O(largest number).
   std::set<NodeIndex> all() const {
     std::set<NodeIndex> nodes;
     for (std::size_t i = 0; i < is_in_.size(); ++i)

@@ -10,7 +10,7 @@ namespace {
 /// Noise correlation below which two viewpoints count as independent.
 constexpr double kIndependent = 0.02;
 
-/// By how much the variance of an observation grows, since it repeats others.
+/// Factor on the variance of an observation for its correlation with earlier ones.
 double variance_factor(const model::KeyframeLandmark& observed, NodeIndex node,
                        model::LandmarkId id, const SmoothingMapperParameters& parameters,
                        const GlobalMap& map) {

@@ -1,4 +1,4 @@
-// How much an observation counts whose error is correlated with earlier ones.
+// Weight of an observation whose error is correlated with earlier ones.
 #pragma once
 
 #include "common/model/keyframe.hpp"
@@ -6,11 +6,11 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Adds the observation of a landmark from a node to the graph, weighted by what it repeats: a
-/// share of an observation's variance is the same as long as the viewpoint is (a trunk is no
-/// cylinder). That correlated error counts as white noise of the same power. While the vehicle is
-/// stationary, a second observation from the same node adds nothing. The landmark must be in the
-/// graph; `observed` is in the node's frame.
+/// Adds the observation of a landmark from a node to the graph, weighted by its correlation with
+/// earlier ones: a share of an observation's variance stays the same while the viewpoint does (a
+/// trunk is no cylinder). That correlated error is modelled as white noise of the same power. While
+/// the vehicle is stationary, a second observation from the same node adds nothing. The landmark
+/// must be in the graph; `observed` is in the node's frame.
 void observe(const model::KeyframeLandmark& observed, NodeIndex node, model::LandmarkId id,
              const SmoothingMapperParameters& parameters, GlobalMap& map);
 

@@ -13,9 +13,10 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Fewest landmarks that start a map without odometry.
+/// Fewest landmarks to start a map without odometry.
 constexpr std::size_t kMinToStart = 3;
-/// Landmarks in common with the map that say that a keyframe agrees with it: two fix a pose.
+/// Number of landmarks in common with the map at which a keyframe agrees with it: two determine a
+/// pose.
 constexpr std::uint32_t kInCommon = 2;
 
 model::MapUpdate with(model::MapUpdateStatus status, std::string reason, model::MapUpdate update) {
@@ -31,14 +32,14 @@ std::vector<model::LandmarkId> ids_of(std::span<const model::Association> pairs)
   return ids;
 }
 
-/// What is named and not used, in order of the keyframe's landmarks.
+/// Adds sightings of landmarks out of use, in order of the keyframe's landmarks.
 void add_gone(std::span<const model::Association> gone, model::MapUpdate& update) {
   if (gone.empty()) return;
   update.associations.insert(update.associations.end(), gone.begin(), gone.end());
   std::ranges::stable_sort(update.associations, {}, &model::Association::keyframe_landmark);
 }
 
-/// All bases are tied to one node: the graph is not solved any more, so nothing moves it.
+/// All bases are tied to one node: the graph is not solved any more, so the bases do not move.
 void keep_pose(const model::Keyframe& keyframe, const Placement& placement, GlobalMap& map) {
   if (!map.graph.newest()) map.graph.add_node({}, false);
   const NodeIndex node = *map.graph.newest();
@@ -104,7 +105,7 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
 
   level_start();
 
-  // Where is it?
+  // Localises the keyframe.
   const auto prediction = motion_.predict(keyframe, map_.graph);
   if (prediction)
     dormancy_.prepare(keyframe.field_of_view, prediction->map_T_centre.mean.translation(), map_);
@@ -117,7 +118,7 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   update.inliers = static_cast<std::uint32_t>(placement->associations.size());
   update.associations = placement->associations;
 
-  // A given map stays as it is.
+  // In localisation-only mode the map does not change.
   if (parameters_.localisation_only) {
     add_gone(name_gone(keyframe, placement->map_T_centre.mean, update.associations, parameters_,
                        map_.landmarks),
@@ -127,7 +128,7 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
     return with(kUpdated, {}, std::move(update));
   }
 
-  // What does it add?
+  // Fuses the keyframe.
   map_.wake(ids_of(placement->associations));
   Condensing::Due due = condensing_.due(keyframe.field_of_view.max_range_m, known_ground_, map_);
   const FusedKeyframe fused = fuse(keyframe, *placement, motion_, parameters_, due.nodes, map_);
@@ -151,9 +152,9 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   return with(kUpdated, fused.reason, std::move(update));
 }
 
-/// What is far leaves the solved graph. Condensing and dormancy each change much of it, which the
-/// next keyframe's solution takes in, and submaps take time of their own: one of them for each
-/// keyframe bounds its time. Who waited goes first at the next.
+/// Removes distant parts from the solved graph. Condensing and dormancy each change much of the
+/// graph, which adds to the next keyframe's solution, and submaps take time of their own: at most
+/// one of them runs per keyframe. Deferred ones run first at the next keyframe.
 void OneMap::lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has_condensed) {
   const bool may_wait = has_condensed && !lightening_.has_waited;
   lightening_.has_waited = may_wait;
@@ -171,8 +172,8 @@ void OneMap::lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has
   }
 }
 
-/// While the gyro's bias is unknown the first scan's heading is, too, and it would be the map's.
-/// But the map does not wait for it longer than `start_wait_s`.
+/// Without the gyro's bias the first scan's heading is inaccurate, and it would be the map's
+/// heading. The map waits for it for at most `start_wait_s`.
 std::string OneMap::why_not_start(const model::Keyframe& keyframe) {
   if (parameters_.localisation_only) return "localisation only, but no map was given";
   if (!parameters_.use_odometry) {
@@ -185,8 +186,8 @@ std::string OneMap::why_not_start(const model::Keyframe& keyframe) {
 }
 
 /// The first keyframe's base is the origin of the map; its centre is fixed relative to it. The
-/// uncertainty of that is added where covariances are reported. As a prior in the graph it would
-/// hold the map by 3 mrad only, and the residues of linearisation would rotate the map.
+/// uncertainty of this fixed pose is added to the reported covariances. As a prior in the graph it
+/// would hold the map's heading to 3 mrad only, and linearisation errors would rotate the map.
 void OneMap::start_map(const model::Keyframe& keyframe, model::MapUpdate& update) {
   const NodeIndex node = map_.graph.add_node(keyframe.centre_T_base().inverse(),
                                              map_.trajectory.is_stationary(keyframe), true);
@@ -205,21 +206,21 @@ void OneMap::start_map(const model::Keyframe& keyframe, model::MapUpdate& update
   report(keyframe, update);
 }
 
-/// The map follows what was learned of the level at its origin, as a whole: its landmarks are not
-/// where they seemed to be from there. The vehicle was where it was.
+/// Applies a later estimate of the level at the map's origin to the whole map: the landmarks move,
+/// the vehicle's pose at the start does not.
 void OneMap::level_start() {
   const auto found = start_level_.take();
   if (!found) return;
   const Eigen::Vector2d moved_m = -CommonError::displacement_m(found->error_rad);
   map_.graph.checkpoint();
   if (!map_.graph.move_origin(moved_m)) return;
-  (void)map_.graph.solve();  // All moves alike.
+  (void)map_.graph.solve();  // All landmarks move alike.
   map_.trajectory.keep_in_place(found->until, -moved_m, map_.graph);
   map_.adopt_estimates();
   common_error_.set_start_level(start_level_.covariance());
 }
 
-/// What the keyframe's motion by landmarks alone and by odometry tell of the scale of either.
+/// Compares the keyframe's motion by landmarks alone with odometry, to estimate their scales.
 void OneMap::compare_scales(const model::Keyframe& keyframe,
                             std::span<const model::Association> associations) {
   std::vector<Eigen::Vector2d> positions_m;
@@ -242,9 +243,9 @@ void OneMap::compare_scales(const model::Keyframe& keyframe,
   common_error_.set_scale_sigma(range_scale_.sigma());
 }
 
-/// Around the prediction. Where few landmarks match there, in the whole map. Where that finds no
-/// place either, the prediction stands as long as odometry reaches: what is seen is mapped, and the
-/// next keyframe has landmarks to match.
+/// Searches around the prediction; if few landmarks match there, in the whole map. If that finds no
+/// place either, the prediction is used while odometry is accurate enough: the landmarks are
+/// mapped, and the next keyframe can match them.
 std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
                                        const std::optional<Prediction>& prediction,
                                        model::MapUpdate& update) {
@@ -275,8 +276,8 @@ std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
   return placement;
 }
 
-/// New landmarks of a fused keyframe, and landmarks that are merged or separated. `gone`: what was
-/// seen where a landmark stands that is not in use; it is none of the new ones.
+/// Adds new landmarks of a fused keyframe, and merges or separates landmarks. `gone`: sightings of
+/// landmarks out of use; they do not become new landmarks.
 void OneMap::extend(const FusedKeyframe& fused, std::span<const model::Association> gone,
                     model::MapUpdate& update) {
   std::vector<model::Association> known = fused.associations;
@@ -292,7 +293,7 @@ void OneMap::extend(const FusedKeyframe& fused, std::span<const model::Associati
   add_gone(gone, update);
 }
 
-/// The pose of an accepted keyframe; motion and single scans go on from there.
+/// Reports the pose of an accepted keyframe; motion and single scans continue from it.
 void OneMap::report(const model::Keyframe& keyframe, model::MapUpdate& update) {
   const Base& base = map_.trajectory.last();
   const auto map_T_centre = map_.trajectory.centre_from_origin(base.node, map_.graph);
@@ -329,7 +330,7 @@ Closures::Decision OneMap::take(const model::LoopClosure& closure) {
     return {model::LoopResult::Status::kRefused, what + " is not in the graph"};
   }
 
-  // It may move all between its ends, and covariances across the whole map are asked for.
+  // The closure may move all nodes between its ends, and needs covariances across the whole map.
   map_.unfreeze();
   return closures_.take(closure, *from, *to, map_);
 }
@@ -357,7 +358,7 @@ bool OneMap::rejoin(GlobalMap left, const Overlap& overlap, model::MapUpdate& up
   pairs = merging_.join(std::move(pairs), map_);
   if (pairs.empty()) return false;
 
-  // The landmarks tie the two now.
+  // The common landmarks tie the two maps now.
   map_.graph.checkpoint();
   map_.graph.take_closure_out(kAbsorbing);
   if (!map_.graph.solve().ok) return false;
@@ -397,7 +398,7 @@ void OneMap::start_with(std::span<const model::MapLandmark> landmarks) {
   agreeing_ = static_cast<std::uint32_t>(parameters_.new_map_keyframes);
 }
 
-/// What the first keyframe alone saw is no landmark, once enough others are there.
+/// Removes landmarks that only the first keyframe observed, once there are enough other keyframes.
 void OneMap::confirm(const model::Keyframe& keyframe, model::MapUpdate& update) {
   const bool was_provisional = is_provisional();
   if (update.inliers >= kInCommon) ++agreeing_;

@@ -1,4 +1,4 @@
-// One map: a keyframe's story in it, from arrival to answer.
+// One map: processing of a keyframe in it, from arrival to result.
 #pragma once
 
 #include <cstdint>
@@ -34,13 +34,13 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// A map and the vehicle in it. The work is done by the parts. See SmoothingMapper for the
-/// functions that it has, too; keyframes must be well-formed and in order of time.
+/// A map and the vehicle in it. The parts do the work. See SmoothingMapper for the functions that
+/// both have; keyframes must be well-formed and in order of time.
 class OneMap {
  public:
   /// An empty map. `id`: upper 16 bit of its landmarks' ids.
   explicit OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id = 1);
-  /// An empty map beside this one: it has the odometry, and does not know where the vehicle is.
+  /// An empty map beside this one, with the same odometry, and with the vehicle not localised.
   OneMap beside(std::uint32_t id) const;
 
   /// Localises the keyframe and fuses it; the first one starts the map.
@@ -53,7 +53,7 @@ class OneMap {
   void add(const model::EkfPose& pose) { motion_.add(pose); }
   /// The filter's estimate of the level error.
   void add(const model::EkfLevel& level) { scan_localiser_.set(level); }
-  /// What was found of the level at the vehicle's last rest.
+  /// Later measurement of the level at the vehicle's last rest.
   void add(const model::RestLevel& level) {
     start_level_.add(level);
     common_error_.set_start_level(start_level_.covariance());
@@ -63,19 +63,20 @@ class OneMap {
 
   /// Landmarks, graph and trajectory; in units of the map, see RangeScale.
   const GlobalMap& map() const { return map_; }
-  /// Metres per unit of the map: all that this class gives out is in units of the map.
+  /// Metres per unit of the map: all outputs of this class are in units of the map.
   double map_factor() const { return range_scale_.map_factor(); }
-  /// Whether so few keyframes agree (`new_map_keyframes`) that the first one may have been wrong.
+  /// Whether fewer than `new_map_keyframes` keyframes agree, so that the first one may have been
+  /// wrong.
   bool is_provisional() const;
-  /// Whether odometry reaches the keyframe from the last one that was localised, well enough to
-  /// look for landmarks around the prediction (`lost_sigma_m`, `lost_sigma_rad`).
+  /// Whether the motion from the last localised keyframe to this one is known well enough to search
+  /// for landmarks around the prediction (`lost_sigma_m`, `lost_sigma_rad`).
   bool reaches(const model::Keyframe& keyframe) const;
-  /// The base of the last keyframe, localised or assumed, frame `map`; none before the first.
+  /// The base of the last keyframe, localised or predicted, frame `map`; none before the first.
   const std::optional<geometry::SE2WithCovariance>& map_T_last_base() const {
     return motion_.map_T_last_base();
   }
 
-  /// The map as other processes get it; see told_map.
+  /// The map for output to other processes; see told_map.
   std::vector<model::MapLandmark> told_landmarks() const {
     return smoothing::told_landmarks(map_, common_error_);
   }
@@ -87,9 +88,9 @@ class OneMap {
   void set_covariances(std::span<model::MapLandmark> landmarks) const {
     smoothing::set_covariances(landmarks, map_, common_error_);
   }
-  /// All that is worth keeping of it; see map_archive.
+  /// The archive entry of the map; see map_archive.
   KeptMap keep() const { return smoothing::keep(map_, common_error_); }
-  /// Parts of it that are kept elsewhere.
+  /// Parts of the map that are stored elsewhere.
   const Submaps& submaps() const { return submaps_; }
   /// See Submaps::may_hand_over().
   void may_hand_over(bool may) { submaps_.may_hand_over(may); }
@@ -103,14 +104,14 @@ class OneMap {
   std::vector<Stretch> take_stretches() { return condensing_.take_stretches(); }
   /// See Condensing::rest().
   Stretch rest() const { return condensing_.rest(map_); }
-  /// Takes a loop closure, or takes one back; see Closures. A keyframe that was handed over is an
-  /// end by its submap only.
+  /// Adds or revokes a loop closure; see Closures. A keyframe that was handed over can be an end
+  /// only by its submap.
   Closures::Decision take(const model::LoopClosure& closure);
-  /// Which landmarks are to be used from now on; those that are not in the map are passed over.
+  /// Sets which landmarks are in use; ids that are not in the map are skipped.
   void take(const model::Existence& existence);
-  /// Makes a map that was left part of this one, where the landmarks that are in both are the same.
-  /// `update` lists what came and what became one. False where the two contradict each other: this
-  /// map is broken then. Cost: the other map, and an update of all between the two.
+  /// Joins an earlier map to this one by their common landmarks. `update` lists the added and
+  /// merged landmarks. False if the two maps contradict each other: this map is then unusable.
+  /// Cost: the other map, and an update of the graph between the two.
   bool rejoin(GlobalMap left, const Overlap& overlap, model::MapUpdate& update);
   /// Landmarks that are new or have moved since the last call, and those within `around_m` of the
   /// last keyframe, in order of id.
@@ -126,10 +127,10 @@ class OneMap {
   }
 
  private:
-  /// Whose turn it is, see lighten().
+  /// State of lighten().
   struct Lightening {
-    bool has_waited = false;     ///< At the last keyframe, for what was condensed.
-    bool submaps_first = false;  ///< Before dormancy.
+    bool has_waited = false;     ///< Condensing made it wait at the last keyframe.
+    bool submaps_first = false;  ///< Before dormancy, at the next keyframe.
   };
 
   bool reaches(const Prediction& prediction) const;
@@ -164,8 +165,9 @@ class OneMap {
   StartLevel start_level_;
   model::SweepLevel sweep_level_;
   RangeScale range_scale_;
-  std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.
-  /// Keyframes that agree with each other: the first, and those that were localised by landmarks.
+  std::optional<model::Utime>
+      first_offered_;  ///< Time of the first keyframe that might have started the map.
+  /// Number of keyframes that agree: the first, and those localised by landmarks.
   std::uint32_t agreeing_ = 0;
   Lightening lightening_;
 };

@@ -10,13 +10,13 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Sigmas within which distances are equal and points lie upon each other.
+/// Sigmas within which distances are equal and points coincide.
 constexpr double kGate_sigmas = 3.0;
-/// Two points nearer to each other than this [m] give no heading.
+/// Two points at a smaller distance [m] determine no heading.
 constexpr double kLeastBaseline_m = 2.0;
 constexpr std::size_t kLeastPairs = 2;
-/// ln of how much likelier the place must be than another one that shares few of its pairs: one
-/// more trunk of a planted row is not enough.
+/// ln of the least ratio of odds to another pose that shares few of the pairs: one more trunk of a
+/// planted row is not enough.
 constexpr double kLeastLead = 9.2;
 
 using Points = std::span<const geometry::UncertainPoint>;
@@ -46,7 +46,8 @@ class PairSearch {
 
     const auto best = std::ranges::max_element(places_, {}, &Place::log_odds);
     for (const Place& other : places_) {
-      // Two that are no play of chance: trunks stand in rows, and odds say nothing.
+      // Two different poses that are both beyond chance: trunks stand in rows, and the odds do not
+      // decide.
       const double most = std::min(kLeastLogOdds, best->log_odds - kLeastLead);
       if (!are_alike(*best, other) && other.log_odds > most) return std::nullopt;
     }
@@ -58,7 +59,7 @@ class PairSearch {
     return ours_[i].variance_m2 + theirs_[j].variance_m2 + variance_m2_;
   }
 
-  /// Lays two of ours upon each two of theirs that are as far apart.
+  /// Aligns two of ours with every two of theirs at the same distance.
   void lay(std::uint32_t i, std::uint32_t k) {
     const Eigen::Vector2d ours_m = ours_[k].position_m - ours_[i].position_m;
     const double length_m = ours_m.norm();
@@ -105,7 +106,7 @@ class PairSearch {
     return off.dot(prior_ * off) <= kMostOff;
   }
 
-  /// Each of ours with the nearest of theirs that is not another one's.
+  /// Pairs each of ours with the nearest free one of theirs.
   std::vector<geometry::PointPair> pairs_at(const geometry::SE2& map_T_newest) const {
     std::vector<geometry::PointPair> pairs;
     for (std::uint32_t i = 0; i < ours_.size(); ++i) {

@@ -1,4 +1,4 @@
-// The place of a few landmarks among a few others, from pairs of them.
+// Search for the pose of a few landmarks among a few others, by pairs.
 #pragma once
 
 #include <optional>
@@ -10,16 +10,17 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Where points of one pass lie upon those of another one.
+/// The pose at which points of one pass coincide with those of another one.
 struct FoundPlace {
-  geometry::SE2WithCovariance map_T_newest;  ///< With what is expected of it.
-  std::vector<geometry::PointPair> pairs;    ///< `reference`: of theirs, `observed`: of ours.
+  geometry::SE2WithCovariance map_T_newest;  ///< Fused with the expected pose.
+  std::vector<geometry::PointPair>
+      pairs;  ///< `reference`: index in `theirs`, `observed`: index in `ours`.
 };
 
-/// Every pair of `ours` is laid upon every pair of `theirs` that is as far apart, and what else
-/// lies upon each other there counts: the place with the largest odds (see log_odds_of_place()),
-/// where no other place comes near to it. For scenes that are too poor for gates and
-/// constellations: sees all places, so cost is O(n^2 m^2) distances, and O(n m) for each that fits
+/// Aligns every pair of `ours` with every pair of `theirs` of equal distance, and counts all points
+/// that then coincide. Returns the pose with the largest odds (see log_odds_of_place()), if no
+/// other pose is nearly as likely. For scenes with too few landmarks for gates and constellations:
+/// it tests all poses, so the cost is O(n^2 m^2) distances, and O(n m) for each alignment that fits
 /// and is expected. `ours`: in the frame of the newest node, `theirs`: in the map, with variances;
 /// `variance_m2`: added to the distance of each pair. `clutter_per_m2`: around each of theirs.
 std::optional<FoundPlace> search_pairs(std::span<const geometry::UncertainPoint> ours,

@@ -12,17 +12,17 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// The vehicle drives so far [m] from one search to the next, and from one place where nothing was
-/// found to the next that is remembered; most of these.
+/// Path length [m] between searches, and between remembered places without a result; and the
+/// largest number of these.
 constexpr double kBetweenSearches_m = 4.0;
 constexpr double kBetweenPlaces_m = 20.0;
 constexpr std::size_t kMostPlaces = 64;
-/// A place is found again by a node so near on the way [m].
+/// A node represents a remembered place within this path length [m].
 constexpr double kSamePlace_m = 10.0;
-/// Rounds of the graph for a large correction.
+/// Iterations of the graph for a large correction.
 constexpr int kRounds = 10;
 
-/// Sum of what the observations of landmarks leave unexplained.
+/// Sum of chi^2 of the landmarks' observations.
 double misfit(const std::vector<MergedPair>& pairs, const GlobalMap& map, bool joined) {
   double sum = 0.0;
   const auto add = [&](model::LandmarkId id, const StoredLandmark& landmark) {
@@ -36,14 +36,14 @@ double misfit(const std::vector<MergedPair>& pairs, const GlobalMap& map, bool j
   return sum;
 }
 
-/// A landmark of the given map as it was told.
+/// A landmark of the given map with its given values.
 struct Given {
-  model::LandmarkId id = 0;  ///< That it counts as now.
+  model::LandmarkId id = 0;  ///< Its present id.
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
 };
 
-/// Takes those of the pairs that no keyframe saw yet into the graph.
+/// Adds those of the pairs that no keyframe observed yet to the graph.
 std::vector<Given> enter_given(const std::vector<MergedPair>& pairs, GlobalMap& map) {
   std::vector<Given> given;
   for (const auto& [old_id, new_id] : pairs) {
@@ -57,7 +57,7 @@ std::vector<Given> enter_given(const std::vector<MergedPair>& pairs, GlobalMap& 
   return given;
 }
 
-/// What their priors leave unexplained.
+/// Sum of chi^2 of their priors.
 double misfit(const std::vector<Given>& given, const GlobalMap& map) {
   double sum = 0.0;
   for (const Given& one : given) {
@@ -67,7 +67,7 @@ double misfit(const std::vector<Given>& given, const GlobalMap& map) {
   return sum;
 }
 
-/// The node that is nearest to a place on the way; none where it is gone.
+/// The node nearest to a place on the path; none if it was removed.
 std::optional<NodeIndex> node_at(const WaitingPlace& place, const GlobalMap& map) {
   std::optional<NodeIndex> nearest;
   double nearest_m = kSamePlace_m;
@@ -101,12 +101,12 @@ JoinedPasses PassJoiner::follow(const model::FieldOfView& field_of_view, NodeInd
     joined = try_again(field_of_view, merges, map);
   }
 
-  // What is known now may tell where earlier ones are.
+  // The new join may determine earlier places.
   if (!joined.pairs.empty()) to_try_ = places_.size();
   return joined;
 }
 
-/// At one place where nothing was found, newest first.
+/// Searches again at one place without a result, newest first.
 JoinedPasses PassJoiner::try_again(const model::FieldOfView& field_of_view, Merges& merges,
                                    GlobalMap& map) {
   to_try_ = std::min(to_try_, places_.size());
@@ -120,7 +120,7 @@ JoinedPasses PassJoiner::try_again(const model::FieldOfView& field_of_view, Merg
   return joined;
 }
 
-/// `might`: set where another pass's distance is not known and both saw enough.
+/// `might`: set if the distance to another pass is unknown and both observed enough landmarks.
 JoinedPasses PassJoiner::join_at(const model::FieldOfView& field_of_view, NodeIndex node,
                                  Merges& merges, GlobalMap& map, bool& might) const {
   for (const EarlierPass& pass : find_earlier_passes(field_of_view, node, map)) {
@@ -135,7 +135,7 @@ JoinedPasses PassJoiner::join_at(const model::FieldOfView& field_of_view, NodeIn
   return {};
 }
 
-/// All or none.
+/// Joins all pairs or none.
 JoinedPasses PassJoiner::join(std::vector<MergedPair> pairs, Merges& merges, GlobalMap& map) const {
   std::vector<model::LandmarkId> ids;
   for (const auto& [old_id, new_id] : pairs) ids.insert(ids.end(), {old_id, new_id});
@@ -149,7 +149,7 @@ JoinedPasses PassJoiner::join(std::vector<MergedPair> pairs, Merges& merges, Glo
   for (const auto& [old_id, new_id] : pairs)
     handed_over.push_back(map.graph.hand_over(old_id, new_id, map.landmarks.at(old_id).nodes));
 
-  // What is left unexplained grows as two numbers each tell where one landmark is.
+  // chi^2 may grow by the degrees of freedom of the merged landmarks: two per pair.
   const auto freedom = 2.0 * static_cast<double>(pairs.size());
   const double most =
       before + freedom + parameters_.max_innovation_sigmas * std::sqrt(2.0 * freedom);

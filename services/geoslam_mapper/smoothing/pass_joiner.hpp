@@ -1,4 +1,4 @@
-// What an earlier pass and this one saw of the same landmarks, joined.
+// Joins the landmarks of an earlier pass and of this one.
 #pragma once
 
 #include <optional>
@@ -9,16 +9,16 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Passes that were joined.
+/// Result of a join.
 struct JoinedPasses {
-  std::vector<MergedPair> pairs;         ///< Landmarks that became one.
-  std::vector<model::LandmarkId> moved;  ///< What moved with them.
+  std::vector<MergedPair> pairs;         ///< Landmarks that were merged.
+  std::vector<model::LandmarkId> moved;  ///< Landmarks that moved with them.
 };
 
-/// A place of this pass where another one's landmarks were not found.
+/// A place of this pass at which the search found no landmarks of another one.
 struct WaitingPlace {
-  double along_m = 0.0;                                  ///< On the way.
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< In the map, when it was passed.
+  double along_m = 0.0;                                  ///< Path length.
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< In the map, at the time of the pass.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -27,26 +27,26 @@ struct WaitingPlace {
   }
 };
 
-/// Looks for the landmarks of this pass among those of earlier ones, while tracking goes on. After
-/// a way on which the pose drifted, what comes into view again lies metres beside what the map has:
-/// each landmark may be any of several, but all together have one place only. Found is it within
-/// what the graph knows of the distance of the two passes (see match_passes()); the pairs become
-/// one landmark each, and where the graph contradicts that, all of it is taken back exactly. Where
-/// nothing is found the place waits: behind a later join its distance is known better.
+/// Searches for the landmarks of this pass among those of earlier ones, while tracking continues.
+/// After drift, landmarks that come into view again lie metres beside their map positions: each
+/// alone is ambiguous, but all together fit at one pose only. The search covers the graph's
+/// uncertainty between the two passes (see match_passes()). The pairs are merged; if the graph
+/// contradicts the merge, it is rolled back exactly. A place without a result is searched again
+/// after a later join, when the distance is known better.
 class PassJoiner {
  public:
   /// `parameters` gives the gates.
   explicit PassJoiner(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
-  /// To be called after each accepted keyframe. The graph is solved where passes were joined. Cost:
-  /// nothing where no other pass is near or its landmarks are bound to the vehicle's pose; else,
-  /// every few metres, one search among the landmarks around, and after a join one for each
-  /// keyframe at the places that wait (64 at most).
+  /// Call it after each accepted keyframe. The graph is solved if passes were joined. Cost: nothing
+  /// if no other pass is near or its landmarks are already tied to the vehicle's pose; else one
+  /// search among the landmarks around every few metres, and after a join one per keyframe at the
+  /// waiting places (64 at most).
   JoinedPasses follow(const model::FieldOfView& field_of_view, NodeIndex newest, Merges& merges,
                       GlobalMap& map);
 
-  /// Makes each pair one landmark and solves: all pairs, or none where the graph contradicts them.
-  /// The landmarks that count as one come first and second as Merges::in_order() gives them.
+  /// Merges each pair and solves: all pairs, or none if the graph contradicts them. The pairs are
+  /// ordered as by Merges::in_order().
   JoinedPasses join(std::vector<MergedPair> pairs, Merges& merges, GlobalMap& map) const;
 
   /// Members of a saved state; see common/state.
@@ -61,9 +61,9 @@ class PassJoiner {
                        GlobalMap& map, bool& might) const;
 
   SmoothingMapperParameters parameters_;
-  double tried_m_ = 0.0;              ///< Path of the vehicle at the last search.
-  std::vector<WaitingPlace> places_;  ///< In order of the way.
-  std::size_t to_try_ = 0;            ///< The first so many of them are tried again.
+  double tried_m_ = 0.0;              ///< Path length of the vehicle at the last search.
+  std::vector<WaitingPlace> places_;  ///< In order of path length.
+  std::size_t to_try_ = 0;            ///< The first `to_try_` places are searched again.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

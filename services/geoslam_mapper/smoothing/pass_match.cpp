@@ -13,28 +13,29 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// What the landmarks around the vehicle leave uncertain of their distances [m].
+/// Sigma of the distances among the landmarks around the vehicle [m].
 constexpr double kLocalSigma_m = 0.08;
-/// Landmarks of the node's pass are taken so far around it [m], or as far as the sensor sees.
+/// Landmarks of the node's pass are collected within this distance [m], or within the sensor's
+/// range.
 constexpr double kScene_m = 45.0;
-/// Most landmarks of the node's pass: the nearest.
+/// Most landmarks of the node's pass; the nearest are taken.
 constexpr std::size_t kMost = 64;
-/// A scene with at most so many possible pairs is poor: all pairs of pairs are looked at.
+/// With at most this number of possible pairs, all pairs of pairs are tested.
 constexpr std::size_t kPoor = 400;
-/// Largest squared Mahalanobis distance of a pair that joins passes from where the others put it:
-/// 78 % of them; and the variance of that [m^2], as trunks in clumps stand 0.3 m apart. The others
-/// are judged one by one when the passes are joined.
+/// Largest squared Mahalanobis distance of a pair that joins passes from its position by the
+/// others: 78 % of correct pairs; and the largest variance of that [m^2], since trunks in clumps
+/// stand 0.3 m apart. The other pairs are judged singly when the passes are joined.
 constexpr double kGoodFit = 3.0;
 constexpr double kTellsPairs_m2 = 0.02;
-/// Of so few pairs the odds of all count, not what each says of the others.
+/// Up to this number of pairs only the joint odds are tested, not each pair against the others.
 constexpr std::size_t kFewPairs = 3;
-/// What each pass bends between its landmarks [m].
+/// Sigma of each pass's deformation between its landmarks [m].
 constexpr double kWarp_m = 0.05;
-/// What was seen on so much of the way [m] before and behind a node of an earlier pass is of that
-/// pass: others may lie there and be off from it.
+/// Landmarks observed within this path length [m] of a node of an earlier pass belong to that pass:
+/// other passes may lie there with another error.
 constexpr double kOnePass_m = 100.0;
 
-/// Whether it was seen within so much of the way around a node.
+/// Whether the landmark was observed within this path length of a node.
 bool is_seen_around(NodeIndex node, double within_m, const StoredLandmark& landmark,
                     const PoseGraph& graph) {
   const double along_m = graph.node(node).along_m;
@@ -43,7 +44,7 @@ bool is_seen_around(NodeIndex node, double within_m, const StoredLandmark& landm
   });
 }
 
-/// Of the distance of two landmarks of different passes, per axis [m^2].
+/// Variance of the distance of two landmarks of different passes, per axis [m^2].
 double variance_of(const geometry::UncertainPoint& ours, const geometry::UncertainPoint& theirs) {
   return ours.variance_m2 + theirs.variance_m2 + kWarp_m * kWarp_m;
 }
@@ -82,7 +83,7 @@ std::optional<FoundPlace> match_by_constellation(const Scene& scene) {
   return place;
 }
 
-/// As Bayes' factor takes them.
+/// The pairs as input of the Bayes factor.
 std::vector<PairOfPasses> pairs_of(const FoundPlace& place, const Scene& scene) {
   std::vector<PairOfPasses> pairs;
   for (const geometry::PointPair& pair : place.pairs) {
@@ -148,7 +149,7 @@ std::vector<MergedPair> match_passes(const Scene& scene,
   }
   if (!place || place->pairs.size() < kFewestOfPass) return {};
 
-  // Is it where the graph expects it, and no play of chance?
+  // Is the pose within the graph's prediction, and unlikely by chance?
   const std::vector<PairOfPasses> laid = pairs_of(*place, scene);
   const geometry::SE2WithCovariance fitted =
       fit_place(laid, place->map_T_newest.mean, scene.map_T_node);
@@ -158,20 +159,20 @@ std::vector<MergedPair> match_passes(const Scene& scene,
   const double least = off <= kWhereExpected ? kLeastLogOddsWhereExpected : kLeastLogOdds;
   if (log_odds_of_place(laid, fitted.mean, scene.map_T_node) < least) return {};
 
-  // Of which trunks is that certain, too?
+  // Which of the pairs are certain, too?
   const std::vector<LeftOut> others_say = leave_out_each(laid, fitted);
   std::vector<MergedPair> pairs;
   for (std::size_t i = 0; i < laid.size(); ++i) {
     const model::LandmarkId ours = scene.ours.ids[place->pairs[i].observed];
     const model::LandmarkId theirs = scene.theirs.ids[place->pairs[i].reference];
     const LeftOut& said = others_say[i];
-    // Of few pairs none is told apart by the others: the odds are of all of them.
+    // With few pairs the others cannot test one: only the joint odds count.
     const bool are_few = laid.size() <= kFewPairs;
     const double variance_m2 = laid[i].variance_m2 + (are_few ? said.variance_m2 : 0.0);
     const bool is_one = (are_few || said.variance_m2 <= kTellsPairs_m2) &&
                         said.apart_m.squaredNorm() <= kGoodFit * variance_m2 &&
                         map.landmarks.at(ours).kind == map.landmarks.at(theirs).kind &&
-                        // Two of one given map are two.
+                        // Two landmarks of one given map are different trunks.
                         !(map.landmarks.at(ours).is_given() && map.landmarks.at(theirs).is_given());
     if (is_one) pairs.push_back(Merges::in_order(ours, theirs, map.landmarks));
   }

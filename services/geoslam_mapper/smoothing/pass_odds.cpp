@@ -16,7 +16,7 @@ namespace {
 constexpr double kLeastClutter = 0.002;
 constexpr int kFitRounds = 3;
 
-/// Of the position of a point of the newest node by its pose, in the newest node's axes.
+/// Jacobian of a point's position by the newest node's pose, in the newest node's axes.
 Eigen::Matrix<double, 2, 3> jacobian_of(const Eigen::Vector2d& ours_m) {
   Eigen::Matrix<double, 2, 3> jacobian;
   jacobian << Eigen::Matrix2d::Identity(), geometry::perpendicular(ours_m);
@@ -53,7 +53,7 @@ std::vector<LeftOut> leave_out_each(std::span<const PairOfPasses> pairs,
   result.reserve(pairs.size());
   const Eigen::Matrix2d turned = map_T_newest.mean.rotation().transpose();
   for (const PairOfPasses& pair : pairs) {
-    // The place without the pair has the residual (I - H)^-1 r, and the variance v (I - H)^-1.
+    // The pose without the pair gives the residual (I - H)^-1 r, with the variance v (I - H)^-1.
     const Eigen::Matrix<double, 2, 3> jacobian = jacobian_of(pair.ours_m);
     const Eigen::Matrix2d of_place = jacobian * map_T_newest.covariance * jacobian.transpose();
     const Eigen::Matrix2d grows =
@@ -86,7 +86,7 @@ double log_odds_of_place(std::span<const PairOfPasses> pairs, const geometry::SE
 
 double clutter_around(std::size_t number, std::span<const geometry::UncertainPoint> points,
                       double reach_m) {
-  // Squared distances to the point itself and the two nearest others.
+  // Squared distances to the point itself and to the two nearest others.
   std::array<double, 3> nearest;
   nearest.fill(std::numeric_limits<double>::infinity());
   for (const geometry::UncertainPoint& other : points) {

@@ -17,7 +17,8 @@ namespace plane = factor_graph::plane;
 
 namespace {
 
-/// Beyond the field of view, so that a landmark at its edge is found whatever the pose's error.
+/// Margin beyond the field of view, so that landmarks at its edge are found despite the pose's
+/// error.
 constexpr double kViewMargin_m = 5.0;
 
 double plane_variance(const model::KeyframeLandmark& landmark) {
@@ -34,14 +35,14 @@ std::vector<model::LandmarkId> landmarks_in_view(const model::Keyframe& keyframe
   return landmarks.index().near({guess.mean.translation(), reach + kViewMargin_m + 3.0 * spread});
 }
 
-/// Gates up to this size [m] tell landmarks apart, also those that the map does not have.
+/// Up to this size [m] gates are unambiguous, also towards landmarks that the map does not contain.
 constexpr double kNarrow_m = 0.3;
-/// The same of landmarks of a given map, before this drive has seen them: most of what their
-/// covariances say is common to all around, and the vehicle was placed among these.
+/// Likewise for landmarks of a given map before this drive observed them: most of their covariance
+/// is common to all around, and the vehicle was localised among these.
 constexpr double kNarrowGiven_m = 1.0;
 
-/// Whether the gate of a landmark that does not share the reference's error is so wide that another
-/// one may be meant. All of a pass are off together then.
+/// Whether a landmark that does not share the reference's error has so wide a gate that it is
+/// ambiguous. All landmarks of a pass are displaced together then.
 bool is_loose(const StoredLandmark& landmark, double gate_m,
               const std::optional<Reference>& reference, int recent_keyframes,
               const Trajectory& trajectory) {
@@ -50,9 +51,9 @@ bool is_loose(const StoredLandmark& landmark, double gate_m,
          !(reference && is_recent(landmark, *reference, recent_keyframes, trajectory));
 }
 
-/// Where the vehicle is in the frame of the map, by the last keyframe. A graph that is not solved,
-/// since the map stays as it is, does not tell; there odometry's prediction does, and one by what
-/// the keyframer tracked, whose noise is assumed, counts as exact.
+/// Pose of the vehicle in the map's frame at the last keyframe. If the graph is not solved
+/// (localisation only), odometry's prediction is used; a prediction by the keyframer's track has
+/// assumed noise and counts as exact.
 geometry::SE2WithCovariance vehicle_in_map(const Prediction& prediction, const GlobalMap& map) {
   if (!map.trajectory.bases().empty()) {
     geometry::SE2WithCovariance last = map.graph.marginal(map.trajectory.last().node);
@@ -62,22 +63,22 @@ geometry::SE2WithCovariance vehicle_in_map(const Prediction& prediction, const G
   return {prediction.map_T_centre.mean, Eigen::Matrix3d::Zero()};
 }
 
-/// What the pose of the vehicle leaves uncertain of where a place of the map is to it, per axis
-/// [m^2].
+/// Variance of a map position relative to the vehicle that follows from the vehicle's pose, per
+/// axis [m^2].
 double variance_from(const geometry::SE2WithCovariance& map_T_vehicle,
                      const Eigen::Vector2d& place_m) {
   const Eigen::Matrix<double, 2, 3> j = plane::linearise(map_T_vehicle.mean, place_m).pose;
   return 0.5 * (j * map_T_vehicle.covariance * j.transpose()).trace();
 }
 
-/// The last keyframe; none where the map has none.
+/// The last keyframe as reference; none if the map has none.
 std::optional<Reference> last_keyframe(const GlobalMap& map) {
   if (map.trajectory.bases().empty()) return std::nullopt;
   return Reference{map.trajectory.last().node, map.trajectory.size()};
 }
 
-/// What saw the landmarks among which the vehicle was found: the middle one of those that the
-/// graph has, in the order in which they were seen last.
+/// The node that observed the landmarks of the pose found: the middle one of those in the graph, in
+/// order of their last observation.
 std::optional<Reference> seen_from(std::span<const constellation::PointAssociation> found,
                                    const GlobalMap& map) {
   std::vector<const StoredLandmark*> seen;
@@ -93,8 +94,8 @@ std::optional<Reference> seen_from(std::span<const constellation::PointAssociati
   return Reference{(*middle)->nodes.back(), (*middle)->last_keyframe};
 }
 
-/// How many of the keyframe's landmarks could be in the map: not more than the map has in the field
-/// of view, without those that are loose.
+/// Number of the keyframe's landmarks that could be matched: at most the number of map landmarks in
+/// the field of view, without ambiguous ones.
 std::size_t count_matchable(const model::Keyframe& keyframe, const geometry::SE2& map_T_centre,
                             const std::vector<model::LandmarkId>& loose,
                             const LandmarkMap& landmarks) {
@@ -112,8 +113,8 @@ std::size_t count_matchable(const model::Keyframe& keyframe, const geometry::SE2
   return std::min(in_view, keyframe.landmarks.size());
 }
 
-/// Covariance of a registration without the information of its guess; where that leaves none, the
-/// guess's own.
+/// Covariance of a registration without the information of its guess; the guess's own if that
+/// leaves none.
 Eigen::Matrix3d without_guess(const Eigen::Matrix3d& registered, const Eigen::Matrix3d& guess) {
   const Eigen::Matrix3d left = registered.inverse() - guess.inverse();
   const Eigen::LLT<Eigen::Matrix3d> factor(left);
@@ -140,7 +141,8 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
     const auto gate_m = [&](double variance_m2) {
       return parameters_.gate_sigmas * std::sqrt(variance_m2) + parameters_.gate_floor_m;
     };
-    // One of the given map that no keyframe saw lies in the frame of the map, as the vehicle does.
+    // A landmark of the given map that no keyframe observed has an error in the frame of the map,
+    // as the vehicle's pose has.
     double of_vehicle_m2 = 0.0;
     if (tracked && landmark.is_given_unseen()) {
       if (!vehicle) vehicle = vehicle_in_map(*tracked, map);
@@ -162,7 +164,7 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
   for (const model::KeyframeLandmark& landmark : keyframe.landmarks)
     observed.push_back({landmark.position_m, plane_variance(landmark)});
 
-  // The keyframe registered to the map.
+  // Registers the keyframe to the map.
   geometry::RegistrationParameters gating;
   gating.gate_sigmas = parameters_.gate_sigmas;
   gating.gate_floor_m = parameters_.gate_floor_m;
@@ -170,7 +172,7 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
                                           guess.covariance + 1e-8 * Eigen::Matrix3d::Identity()};
   const geometry::Registration found = register_points(reference, observed, broad, gating);
 
-  // Pairs of the same kind.
+  // Keeps pairs of the same kind.
   Placement placement{
       {found.reference_T_observed, found.covariance}, {}, tracked.has_value(), std::move(loose)};
   for (const geometry::PointPair& pair : found.pairs) {
@@ -191,7 +193,7 @@ Tracking PlaceRecogniser::track(const model::Keyframe& keyframe, const Predictio
   const geometry::MatchQuota quota{static_cast<std::size_t>(parameters_.min_matched),
                                    parameters_.min_matched_ratio};
 
-  // Odometry alone will do where there is next to nothing to match.
+  // With almost no landmarks to match, odometry alone is sufficient.
   const bool is_confirmed = prediction.from_odometry ? quota.share_is_met(matched, possible) ||
                                                            possible < quota.min_matched
                                                      : quota.is_met(matched, possible);
@@ -199,7 +201,7 @@ Tracking PlaceRecogniser::track(const model::Keyframe& keyframe, const Predictio
 }
 
 SearchResult PlaceRecogniser::search(const model::Keyframe& keyframe, const GlobalMap& map) const {
-  // A pose by the constellation of landmarks.
+  // Search of a pose by the constellation of landmarks.
   std::vector<constellation::ObservedPoint> points;
   for (const model::KeyframeLandmark& landmark : keyframe.landmarks)
     points.push_back({landmark.position_m, std::sqrt(plane_variance(landmark))});
@@ -212,7 +214,8 @@ SearchResult PlaceRecogniser::search(const model::Keyframe& keyframe, const Glob
     return result;
   }
 
-  // Association around that pose, which rests on the same landmarks: they count once.
+  // Association around that pose. The pose is from the same landmarks, so its information is
+  // removed.
   const geometry::SE2WithCovariance guess{found.map_T_sensor, found.covariance};
   result.placement =
       associate(keyframe, guess, seen_from(found.associations, map), std::nullopt, map);

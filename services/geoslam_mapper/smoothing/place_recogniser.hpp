@@ -1,4 +1,4 @@
-// Where is a keyframe in the map? By prediction and gating, or by search of the whole map.
+// Localises a keyframe in the map: by prediction and gating, or by search of the whole map.
 #pragma once
 
 #include <optional>
@@ -11,35 +11,35 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// What a search of the whole map gave.
+/// Result of a search of the whole map.
 struct SearchResult {
-  std::optional<Placement> placement;  ///< None where the search is not sure.
-  std::uint32_t hypotheses = 0;        ///< Poses that were tried.
-  double log10_false_alarm = 0.0;      ///< Bound on the chance of so good a pose anywhere.
+  std::optional<Placement> placement;  ///< None if the result is ambiguous.
+  std::uint32_t hypotheses = 0;        ///< Number of poses tested.
+  double log10_false_alarm = 0.0;      ///< Bound on the chance of an equally good pose anywhere.
   std::string reason;                  ///< Why there is no placement.
 };
 
-/// What tracking gave: a place by the prediction and what matches it.
+/// Result of tracking: a placement from the prediction and its matches.
 struct Tracking {
   Placement placement;
-  /// Enough of the landmarks match that could: at least `min_matched_ratio` of them, and without
+  /// Enough of the possible matches were found: at least `min_matched_ratio` of them, and without
   /// odometry at least `min_matched`.
   bool is_confirmed = false;
 };
 
-/// Places keyframes in a map that it does not change. It has no state.
+/// Localises keyframes in a map without changing it. It has no state.
 class PlaceRecogniser {
  public:
-  /// `parameters` gives the gates and how many matches are enough.
+  /// `parameters` gives the gates and the least number of matches.
   explicit PlaceRecogniser(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
-  /// Association in gates around a prediction, with landmarks whose gates tell them apart.
+  /// Association in gates around a prediction, using landmarks whose gates do not overlap.
   Tracking track(const model::Keyframe& keyframe, const Prediction& prediction,
                  const GlobalMap& map) const;
 
-  /// Search of the whole map without any prior (constellation::ConstellationMap). Landmarks count
-  /// whose gates tell them apart from where the vehicle was found, not from where it comes from.
-  /// The index must be up to date: LandmarkMap::catch_up().
+  /// Search of the whole map without any prior (constellation::ConstellationMap). Whether gates
+  /// overlap is judged at the pose found, not at the predicted pose. The index must be up to date:
+  /// LandmarkMap::catch_up().
   SearchResult search(const model::Keyframe& keyframe, const GlobalMap& map) const;
 
  private:

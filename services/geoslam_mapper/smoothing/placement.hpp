@@ -1,4 +1,4 @@
-// Where a keyframe is thought to be, and where it was found.
+// Predicted pose and placement of a keyframe.
 #pragma once
 
 #include <vector>
@@ -11,15 +11,15 @@ namespace understory::geoslam_mapper::smoothing {
 /// The expected pose of a keyframe's centre, frame `map`.
 struct Prediction {
   geometry::SE2WithCovariance map_T_centre;
-  bool from_odometry = false;  ///< False: from what the keyframer tracked, with assumed noise.
+  bool from_odometry = false;  ///< False: from the keyframer's tracking, with assumed noise.
 };
 
-/// Where a keyframe is, and which of its landmarks are which of the map's.
+/// Pose of a keyframe, and the associations of its landmarks with the map's.
 struct Placement {
   geometry::SE2WithCovariance map_T_centre;
   std::vector<model::Association> associations;
   bool by_prediction = false;  ///< False: by search of the whole map.
-  /// Landmarks around that may be any of several by where they are, ascending: see PassJoiner.
+  /// Landmarks around whose association is ambiguous by position, ascending: see PassJoiner.
   std::vector<model::LandmarkId> loose;
 };
 

@@ -51,14 +51,14 @@ void PoseGraph::rollback() {
   before_.reset();
 }
 
-/// The node for change; its first change since the checkpoint keeps what it was.
+/// The node for changes; its first change since the checkpoint saves its previous value.
 Node& PoseGraph::edit(NodeIndex node) {
   forget_ahead_of(node);
   if (before_ && node < before_->nodes) before_->changed.try_emplace(node, nodes_[node]);
   return nodes_[node];
 }
 
-/// What was computed ahead does not hold once its nodes change.
+/// Drops the condensed measurement computed in advance if one of its nodes changes.
 void PoseGraph::forget_ahead_of(NodeIndex node) {
   if (ahead_ && std::ranges::find(ahead_->part.inner, node) != ahead_->part.inner.end())
     ahead_.reset();
@@ -153,7 +153,7 @@ std::vector<HandedOver> PoseGraph::hand_over(model::LandmarkId old_id, model::La
     auto handle = observations.extract(old_id);
     if (handle.empty()) continue;
 
-    // A node that observed both keeps its observation of the landmark that stays.
+    // A node that observed both keeps only its observation of the remaining landmark.
     plane::PointObservation factor = smoother_.observation(handle.mapped());
     const bool counts = !observations.contains(new_id);
     result.push_back({node, factor.position, factor.information, counts});
@@ -265,7 +265,7 @@ double PoseGraph::closure_chi2(std::uint64_t id) const {
   return off.dot(measured.information * off);
 }
 
-/// What is condensed or wakes lies behind: the next keyframe goes on where the newest one is.
+/// Condensed or woken parts are behind the vehicle: the next keyframe continues at the newest node.
 plane::SmootherUpdate PoseGraph::solve() {
   ahead_.reset();
   if (newest_) smoother_.expect_changes_at(nodes_[*newest_].centre);
@@ -349,7 +349,7 @@ std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> PoseGraph::take_moved
     if (id != 0) result.emplace_back(id, smoother_.point(point));
   }
 
-  // Dormant ones follow their nodes.
+  // Dormant landmarks follow their nodes.
   std::vector<model::LandmarkId> dormant;
   for (const NodeIndex node : moved_nodes()) {
     if (!has_left(node)) continue;

@@ -30,8 +30,8 @@ namespace understory::geoslam_mapper::smoothing {
 struct LooseGraph;
 
 /// Nodes and landmarks as variables, their measurements as factors, solved incrementally. Numbers
-/// of nodes are those of the smoother's poses; a new node may get the number of one that was taken
-/// out. Everything that a refused keyframe may have changed is in here: rollback() takes it back
+/// of nodes are those of the smoother's poses; a new node may get the number of a removed one. This
+/// class contains everything that a refused keyframe may have changed: rollback() restores it
 /// exactly. Frame: `map`.
 ///
 /// More than 20 functions because it is the mapper's view of the smoother: a third are accessors.
@@ -40,29 +40,30 @@ class PoseGraph {
   /// An empty graph.
   explicit PoseGraph(const SmoothingMapperParameters& parameters);
 
-  /// Remembers the state.
+  /// Saves the state.
   void checkpoint();
   /// Restores exactly the state of the last checkpoint(). Costs what changed.
   void rollback();
 
-  /// Adds a node at a first guess of its pose. A fixed one is held there, to a micrometre: it
+  /// Adds a node at an initial guess of its pose. A fixed node is held there, to a micrometre: it
   /// carries the origin of the map.
   NodeIndex add_node(const geometry::SE2& map_T_centre, bool is_stationary, bool is_fixed = false);
-  /// Adds a landmark at a first guess of its position, with a prior [m^2] if it was given.
+  /// Adds a landmark at an initial guess of its position, with a prior [m^2] if it was given.
   void add_landmark(model::LandmarkId id, const Eigen::Vector2d& position_m,
                     const std::optional<Eigen::Matrix2d>& prior_covariance_m2);
   /// Adds an observation: position [m] in the node's frame with its information [1/m^2]. A further
-  /// one of the same landmark from the same node is averaged into the first by information.
+  /// one of the same landmark from the same node is averaged with the first, weighted by
+  /// information.
   void observe(NodeIndex node, model::LandmarkId id, const Eigen::Vector2d& position_m,
                const Eigen::Matrix2d& information);
-  /// Takes an observation out.
+  /// Removes an observation.
   void ignore(NodeIndex node, model::LandmarkId id);
-  /// Makes two landmarks one: the observations of `old_id` from `nodes` become those of `new_id`.
-  /// They do not count where a node observed both.
+  /// Merges two landmarks: the observations of `old_id` from `nodes` become those of `new_id`. They
+  /// are ignored at nodes that observed both.
   std::vector<HandedOver> hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
                                     std::span<const NodeIndex> nodes);
-  /// Gives observations of `from_id` back to a landmark that is in the graph, those that nothing
-  /// was added to since; returns their nodes.
+  /// Returns those observations of `from_id` that are unchanged since to a landmark of the graph;
+  /// gives their nodes.
   std::vector<NodeIndex> give_back(model::LandmarkId from_id, model::LandmarkId to_id,
                                    std::span<const HandedOver> handed_over);
   /// Adds the motion from an earlier node; nothing if it is the same node.
@@ -71,27 +72,27 @@ class PoseGraph {
   /// Adds a loop closure between two nodes. Its number must be new.
   void add_closure(std::uint64_t id, NodeIndex a, NodeIndex b,
                    const geometry::SE2WithCovariance& a_T_b);
-  /// Takes it out again; there must be one.
+  /// Removes a closure; it must exist.
   void take_closure_out(std::uint64_t id);
-  /// Whether it counts. It does no more where a node was taken out with which it went.
+  /// Whether the closure is in the graph. It is not if it was removed with a node.
   bool has_closure(std::uint64_t id) const;
-  /// chi^2 (3 degrees of freedom) of a closure at the present estimate; there must be one.
+  /// chi^2 (3 degrees of freedom) of a closure at the present estimate; it must exist.
   double closure_chi2(std::uint64_t id) const;
 
-  /// Share of the information that is kept, by the point of the path [m].
+  /// Share of the information to keep, as a function of the path length [m].
   using ShareAlong = std::function<double(double along_m)>;
-  /// Scales the information of all measurements on the path between two nodes: errors there are
-  /// larger than was stated. Closures keep theirs. The inverse shares undo it, but for rounding.
+  /// Scales the information of all measurements on the path between two nodes, since errors there
+  /// are larger than stated. Closures keep theirs. The inverse shares undo it, except for rounding.
   /// Cost: the measurements of that path.
   void relax(NodeIndex a, NodeIndex b, const ShareAlong& share_at);
 
-  /// Takes nodes and motions out. What the nodes observed becomes observations of other nodes, in
-  /// whose frames the two agree to within the covariance of `into_T_node`. Motions that begin or
-  /// end at the nodes are lost; one to a later node that stays begins at the other node then. None
-  /// of the other nodes may be taken out, too, nor the newest one. Cost: the factors of the nodes.
+  /// Removes nodes and motions. The nodes' observations become observations of other nodes; the
+  /// frames of the two agree to within the covariance of `into_T_node`. Motions that begin or end
+  /// at the nodes are lost; one to a later node that stays then begins at the other node. None of
+  /// the other nodes may be removed, too, nor the newest one. Cost: the factors of the nodes.
   void take_out(const Surplus& surplus);
 
-  /// Nodes as a graph of their own, and what its numbers are here. Poses: `inner`, then `outer`.
+  /// Nodes as a separate graph, with the numbers that they have here. Poses: `inner`, then `outer`.
   struct Part {
     /// A motion to another node.
     struct Outer {
@@ -105,89 +106,91 @@ class PoseGraph {
     std::vector<model::LandmarkId> landmarks;
     std::vector<factor_graph::plane::ScalarId> scalars;  ///< May repeat.
   };
-  /// What these nodes observed and how they moved, also to others. Cost: their factors.
+  /// These nodes with their observations and motions, also to other nodes. Cost: their factors.
   Part part_of(std::span<const NodeIndex> nodes) const;
-  /// Puts one node in the place of these, all of which there are: what they observed and how they
-  /// moved becomes one condensed measurement (plane::condense). The newest node and the one that
-  /// holds the map must not be among them. The retirements tell where each node was relative to
-  /// the new one; empty, and nothing changed, where their own factors leave a node undetermined.
-  /// Cost: the factors of the nodes, and condense_ahead() where it was not called.
+  /// Replaces these nodes, all of which must exist, by one node: their observations and motions
+  /// become one condensed measurement (plane::condense). The newest node and the one that holds the
+  /// map must not be among them. The retirements give the pose of each node relative to the new
+  /// one; empty and without change if the nodes' own factors leave a node undetermined. Cost: the
+  /// factors of the nodes, and condense_ahead() if it was not called.
   std::vector<Retirement> condense(std::span<const NodeIndex> nodes);
-  /// Computes what condense() of these nodes puts in their place, which it takes if neither they
-  /// nor any estimate was changed by then. Nothing else depends on it. Cost: cubic in the nodes,
+  /// Computes the condensed measurement of these nodes in advance; condense() uses it if neither
+  /// they nor any estimate has changed by then. It has no other effect. Cost: cubic in the nodes,
   /// linear in their factors.
   void condense_ahead(std::span<const NodeIndex> nodes);
 
-  /// Takes landmarks out of the solved graph: what they measure of the nodes that observed them,
-  /// all of which must be condensed, becomes motions between these. Exact but for the linearisation
-  /// where two nodes observed a landmark or informations are isotropic, else a little less is kept;
-  /// undone by wake(). Landmarks with a prior must not be among them. Cost: the landmarks that the
-  /// nodes have in common.
+  /// Removes landmarks from the solved graph: their information on the nodes that observed them,
+  /// all of which must be condensed, becomes motions between these nodes. Exact, except for the
+  /// linearisation, if two nodes observed a landmark or informations are isotropic, else a little
+  /// information is lost; wake() undoes it. Landmarks with a prior must not be among them. Cost:
+  /// the landmarks that the nodes have in common.
   void make_dormant(std::span<const model::LandmarkId> ids,
                     const std::map<model::LandmarkId, StoredLandmark>& landmarks);
-  /// Takes landmarks into the solved graph again, where they are dormant.
+  /// Moves dormant ones of these landmarks into the solved graph.
   void wake(std::span<const model::LandmarkId> ids);
-  /// Takes dormant landmarks out of the graph altogether. What they measure of the nodes stays: one
-  /// motion of each two nodes, whatever is away of them. bring_back() undoes it, but for terms of
-  /// second order. Throws std::out_of_range where one is not dormant. Cost: the landmarks, and
-  /// those that their nodes have in common.
+  /// Removes dormant landmarks from the graph altogether. Their information on the nodes stays: one
+  /// motion per pair of nodes, for all removed landmarks together. bring_back() undoes it, except
+  /// for terms of second order. Throws std::out_of_range if one is not dormant. Cost: the
+  /// landmarks, and those that their nodes have in common.
   AwayLandmarks put_away(std::span<const model::LandmarkId> ids);
-  /// Makes them dormant landmarks of the graph again. Throws std::invalid_argument where an
-  /// observation is of a node that is not condensed or is frozen, or has no information, or where
-  /// no motion stands for them; nothing is changed then.
+  /// Makes them dormant landmarks of the graph again. Throws std::invalid_argument without change
+  /// if an observation has no information or is from a node that is not condensed or is frozen, or
+  /// if no motion represents them.
   void bring_back(std::span<const model::LandmarkId> ids, const AwayLandmarks& away);
-  /// How a node lies to others that are not frozen, closures among it, with the gyro's bias as it
-  /// is known now; without what landmarks tell.
+  /// Motions between a node and others that are not frozen, including closures, with the present
+  /// gyro bias; without the information of landmarks.
   std::vector<FrozenMotion> motions_of(NodeIndex node) const;
   /// Ids of a node's dormant landmarks.
   std::span<const model::LandmarkId> dormant_of(NodeIndex node) const;
-  /// The node that observed a dormant landmark first. Throws std::out_of_range likewise.
+  /// The node that observed a dormant landmark first. Throws std::out_of_range if it is not
+  /// dormant.
   NodeIndex home_of(model::LandmarkId id) const { return dormant_.at(id).front().node; }
-  /// Takes nodes out of the solved graph: all that was measured of them becomes one condensed
-  /// measurement of the nodes around them (frozen_part). They must be condensed ones with nothing
-  /// in the graph but motions; others among them are passed over. False, and nothing is changed,
-  /// where what is left would be tied at too many nodes. Undone by thaw(). Cost: one factorisation
-  /// of these nodes, however many were frozen before. Another node holds the solved graph from then
-  /// on, where it is, so that what far linearisations leave does not move the ground around the
-  /// vehicle; the origin stays as a variable, and covariances count from it.
+  /// Removes nodes from the solved graph: all their measurements become one condensed measurement
+  /// of the nodes around them (frozen_part). They must be condensed and have only motions in the
+  /// graph; others are skipped. False without change if the result would tie too many nodes. thaw()
+  /// undoes it. Cost: one factorisation of these nodes, whatever the number of nodes frozen before.
+  /// From then on another node holds the solved graph at its pose, so that linearisation errors of
+  /// distant nodes do not move the map around the vehicle; the origin stays a variable, and
+  /// covariances count from it.
   bool freeze(std::span<const NodeIndex> nodes);
-  /// Takes nodes into the solved graph again, where they are frozen. False where none is, and
-  /// nothing is changed. The same cost.
+  /// Moves frozen ones of these nodes into the solved graph again. False without change if none is
+  /// frozen. Same cost.
   bool thaw(std::span<const NodeIndex> nodes);
-  /// Takes all frozen nodes into the solved graph again, and holds it at the origin of the map:
-  /// what is to be joined with it may move all of them. The same cost.
+  /// Moves all frozen nodes into the solved graph again and holds it at the origin of the map,
+  /// before a join that may move all of them. Same cost.
   void unfreeze();
-  /// The node that carries the origin of the map; none where the map was given.
+  /// The node that carries the origin of the map; none if the map was given.
   std::optional<NodeIndex> origin() const;
-  /// Moves the node that carries the origin, and all with it once the graph is solved. False, and
-  /// nothing is changed, where it does not hold the solved graph. Cost: the solved graph.
+  /// Moves the node that carries the origin, and the whole map with it once the graph is solved.
+  /// False without change if it does not hold the solved graph. Cost: the solved graph.
   bool move_origin(const Eigen::Vector2d& by_m);
-  /// From now on the node counts as a condensed one: it gets nothing more. For the origin, which is
-  /// in no stretch, once it is far behind.
+  /// Marks a node as condensed: it receives no more observations. For the origin, which is in no
+  /// stretch, once it is far behind.
   void close(NodeIndex node) { edit(node).is_condensed = true; }
-  /// Whether the node is out of the solved graph.
+  /// Whether the node is frozen (outside the solved graph).
   bool is_frozen(NodeIndex node) const { return frozen_.contains(node); }
-  /// Number of nodes out of the solved graph.
+  /// Number of frozen nodes.
   std::size_t frozen_count() const { return frozen_.size(); }
-  /// Whether the landmark was taken out of the solved graph.
+  /// Whether the landmark is dormant (outside the solved graph).
   bool is_dormant(model::LandmarkId id) const { return dormant_.contains(id); }
-  /// Position of a dormant landmark [m] at the nodes' estimates. Throws std::out_of_range where it
-  /// is not dormant.
+  /// Position of a dormant landmark [m] at the nodes' estimates. Throws std::out_of_range if it is
+  /// not dormant.
   Eigen::Vector2d dormant_position(model::LandmarkId id) const;
   /// Ids of all landmarks in the solved graph, ascending. O(landmarks in it).
   std::vector<model::LandmarkId> awake() const;
 
-  /// All that was measured, for another graph to absorb. O(graph).
+  /// All measurements, for another graph to absorb. O(graph).
   LooseGraph loosened();
-  /// Adds all of another graph, moved to `map_T_other`; its paths count from `further_m` [m] on.
-  /// What held it is not among it: a measurement between the two must follow before the graph is
-  /// solved. Returns the number of its first node: the others follow. Cost: the other graph.
+  /// Adds all of another graph, moved to `map_T_other`; its path lengths count from `further_m`
+  /// [m]. Its fixed node is no longer held: a measurement between the two graphs must be added
+  /// before they are solved. Returns the number of its first node: the others follow. Cost: the
+  /// other graph.
   NodeIndex absorb(const LooseGraph& other, const geometry::SE2& map_T_other, double further_m);
 
-  /// Updates the estimates. Not `ok` where the measurements leave variables undetermined.
+  /// Updates the estimates. Not `ok` if the measurements leave variables undetermined.
   factor_graph::plane::SmootherUpdate solve();
 
-  /// A node of the graph. Throws std::out_of_range where there is none.
+  /// A node of the graph. Throws std::out_of_range if there is none.
   const Node& node(NodeIndex node) const { return nodes_.at(node); }
   /// The node that was added last; none before the first.
   std::optional<NodeIndex> newest() const { return newest_; }
@@ -195,7 +198,7 @@ class PoseGraph {
   std::size_t node_count() const { return nodes_.size() - free_nodes_.size(); }
   /// map_T_centre of a node.
   geometry::SE2 pose(NodeIndex node) const { return smoother_.pose(nodes_[node].centre); }
-  /// Largest move of a node [m] that its dormant landmarks do not follow at once.
+  /// Largest move of a node [m] before its dormant landmarks are moved with it.
   static constexpr double kDormantMove_m = 0.05;
 
   /// Position of a landmark [m]; none while it is not in the graph.
@@ -207,26 +210,26 @@ class PoseGraph {
                                                            model::LandmarkId id) const {
     return smoother_.observation(nodes_[node].observations().at(id));
   }
-  /// map_T_centre with its marginal covariance (right perturbation), zero where it is undetermined.
+  /// map_T_centre with its marginal covariance (right perturbation), zero if it is undetermined.
   geometry::SE2WithCovariance marginal(NodeIndex node) const;
-  /// a_T_b with its covariance (right perturbation); none where it is undetermined.
+  /// a_T_b with its covariance (right perturbation); none if it is undetermined.
   std::optional<geometry::SE2WithCovariance> relative(NodeIndex a, NodeIndex b) const;
-  /// Variances [m^2] of landmarks of the graph relative to a node, per axis. Empty where a variable
-  /// is undetermined.
+  /// Variances [m^2] of landmarks of the graph relative to a node, per axis. Empty if a variable is
+  /// undetermined.
   std::vector<double> relative_variances(NodeIndex node,
                                          std::span<const model::LandmarkId> ids) const;
-  /// Covariances [m^2] of landmarks' positions, frame `map`; zero where a landmark is not in the
-  /// solved graph or undetermined. Costs one elimination of the paths to the root.
+  /// Covariances [m^2] of landmarks' positions, frame `map`; zero if a landmark is undetermined or
+  /// not in the solved graph. Cost: one elimination of the paths to the root.
   std::vector<Eigen::Matrix2d> covariances(std::span<const model::LandmarkId> ids) const;
   /// Covariances of map_T_centre of nodes, which may repeat (right perturbation); zero likewise.
   std::vector<Eigen::Matrix3d> covariances(std::span<const NodeIndex> nodes) const;
-  /// Covariance [m^2] of the difference of two landmarks' positions, frame `map`; none where it is
+  /// Covariance [m^2] of the difference of two landmarks' positions, frame `map`; none if it is
   /// undetermined.
   std::optional<Eigen::Matrix2d> difference_covariance(model::LandmarkId a,
                                                        model::LandmarkId b) const;
   /// Landmarks that updates moved since the checkpoint, with their positions [m], each once.
-  /// Dormant ones are among them where a node of theirs has moved by kDormantMove_m since they
-  /// were.
+  /// Dormant ones are included if one of their nodes has moved by kDormantMove_m since they last
+  /// followed it.
   std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> take_moved_landmarks();
   /// Nodes that updates moved since the checkpoint, each once.
   std::vector<NodeIndex> moved_nodes() const;
@@ -252,12 +255,12 @@ class PoseGraph {
     std::size_t nodes = 0;
     std::size_t points = 0;
     std::optional<NodeIndex> newest;
-    std::map<NodeIndex, Node> changed;  ///< Of those there were, as they were.
+    std::map<NodeIndex, Node> changed;  ///< Previous values of changed nodes.
     std::map<std::uint32_t, std::uint64_t> closures;
     std::optional<Anchor> origin;
     std::optional<Anchor> anchor;
-    std::vector<factor_graph::plane::PointId> restarted;  ///< Points with a landmark again.
-    /// Points whose landmark was joined with another one.
+    std::vector<factor_graph::plane::PointId> restarted;  ///< Points that got a landmark again.
+    /// Points whose landmark was merged into another one.
     std::vector<std::pair<factor_graph::plane::PointId, model::LandmarkId>> dropped;
   };
   bool is_within(NodeIndex node, double from_m, double to_m) const;
@@ -267,16 +270,16 @@ class PoseGraph {
   Node& edit(NodeIndex node);
   void forget_ahead_of(NodeIndex node);
   NodeIndex put_node(const geometry::SE2& map_T_centre, bool is_stationary, double along_m);
-  /// What two nodes have in common, smaller number first.
+  /// A pair of nodes, smaller number first.
   using TiedNodes = std::pair<NodeIndex, NodeIndex>;
-  /// The landmarks that two nodes observed and that are not solved, as one motion between the
-  /// nodes: the dormant ones, and those that are kept elsewhere. One of those goes or comes from
-  /// here to there without a change of the motion.
+  /// The landmarks outside the solved graph that two nodes observed, as one motion between the
+  /// nodes: the dormant ones and the stored ones. A landmark changes from one kind to the other
+  /// without a change of the motion.
   struct Tie {
     std::optional<factor_graph::plane::MotionId> motion;
     std::vector<model::LandmarkId> landmarks;  ///< The dormant ones.
-    MeasuredMotion away;                       ///< What stands for the others,
-    std::uint32_t submaps = 0;                 ///< parts of so many submaps.
+    MeasuredMotion away;                       ///< Motion for the stored ones, of ...
+    std::uint32_t submaps = 0;                 ///< ... parts of this number of submaps.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
@@ -293,7 +296,7 @@ class PoseGraph {
   bool may_freeze(NodeIndex node) const;
   void hold(const Anchor& anchor);
   std::optional<Anchor> anchor_beyond(const std::set<NodeIndex>& going) const;
-  /// The origin is a variable like others then.
+  /// Then the origin is an ordinary variable.
   bool is_held_elsewhere() const { return origin_ && anchor_->node != origin_->node; }
   Eigen::Matrix3d anchor_covariance() const;
   Eigen::Matrix3d of_anchor(const geometry::SE2& map_T_node, const Eigen::Matrix3d& anchor) const;
@@ -339,32 +342,33 @@ class PoseGraph {
   factor_graph::plane::RelativePose take_motion_out(MotionRef ref);
 
   factor_graph::plane::Smoother smoother_;
-  std::deque<Node> nodes_;  ///< By blocks: a long drive has many.
+  std::deque<Node> nodes_;  ///< In blocks: a long drive has many nodes.
   std::unordered_map<model::LandmarkId, factor_graph::plane::PointId> point_of_;
-  /// By point of the smoother; 0 where the landmark was merged into another.
+  /// By point of the smoother; 0 if the landmark was merged into another.
   std::vector<model::LandmarkId> landmark_of_point_;
   GyroBias gyro_;
   std::map<model::LandmarkId, std::vector<DormantObservation>> dormant_;
-  std::map<TiedNodes, Tie> ties_;                    ///< But for those that are frozen.
+  std::map<TiedNodes, Tie> ties_;                    ///< Without the frozen ones.
   std::map<std::uint32_t, std::uint64_t> closures_;  ///< Closures by the number of their motion.
   NodeSet frozen_;
-  FrozenMotions frozen_motions_;              ///< With an end that is frozen.
-  std::vector<FrozenFactor> frozen_factors_;  ///< In the solved graph; from the motions.
-  /// What is dormant of a node's landmarks, and where the node was when they last followed it.
+  FrozenMotions frozen_motions_;              ///< With at least one frozen end.
+  std::vector<FrozenFactor> frozen_factors_;  ///< In the solved graph; computed from the motions.
+  /// A node's dormant landmarks, and the node's pose at their last update.
   struct DormantOfNode {
     std::vector<model::LandmarkId> landmarks;
     geometry::SE2 followed;
   };
-  std::map<NodeIndex, DormantOfNode> dormant_of_node_;  ///< Where there are any; from dormant_.
-  std::optional<NodeIndex> newest_;                     ///< Added last.
-  std::optional<Anchor> origin_;                        ///< The first keyframe's.
-  std::optional<Anchor> anchor_;                        ///< What holds the solved graph now.
+  std::map<NodeIndex, DormantOfNode>
+      dormant_of_node_;              ///< Only nodes that have any; computed from dormant_.
+  std::optional<NodeIndex> newest_;  ///< Added last.
+  std::optional<Anchor> origin_;     ///< At the first keyframe.
+  std::optional<Anchor> anchor_;     ///< The node that holds the solved graph now.
   FreeNumbers free_nodes_;
   FreeNumbers free_points_;
   FreeNumbers free_observations_;
   FreeNumbers free_motions_;
   FreeNumbers free_biased_;
-  /// Nodes that are to become one, and what they measure. From the rest: it is in no saved state.
+  /// Nodes to condense, and their condensed measurement. Computed from other members: not saved.
   struct CondensedAhead {
     Part part;
     factor_graph::plane::CondensedPart condensed;

@@ -7,9 +7,9 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Landmarks that place a vehicle well enough: errors of single ones average out.
+/// Fewest landmarks for a position: errors of single ones average out.
 constexpr std::size_t kLeastLandmarks = 6;
-/// Squared Mahalanobis distance (2 degrees of freedom) from which on a motion does not count.
+/// Squared Mahalanobis distance (2 degrees of freedom) above which a motion is ignored.
 constexpr double kContradicts = 25.0;
 
 double squared(double value) { return value * value; }
@@ -30,7 +30,7 @@ void RangeScale::add(const LocatedKeyframe& located,
   const double off = (by_landmarks - odometry_factor() * by_odometry).squaredNorm() / variance_m2;
   if (off > kContradicts) return;
 
-  // Noise of odometry adds to its squared length, but not to the product.
+  // Noise of odometry biases its squared length, but not the product.
   const double squared_m2 = by_odometry.squaredNorm() - 2.0 * noise_m2;
   if (squared_m2 <= 0.0) return;
   products_ += by_landmarks.dot(by_odometry) / variance_m2;
@@ -50,7 +50,8 @@ double RangeScale::odometry_factor() const {
   return 1.0 + ratio_error() * prior / (prior + ratio_variance());
 }
 
-/// The ratio is the range's scale over odometry's: each has the share of it that its prior allows.
+/// The ratio is the range's scale divided by odometry's: it is split between them by their prior
+/// variances.
 double RangeScale::range_error() const {
   if (!is_estimated()) return 0.0;
   const double prior = squared(range_sigma_);

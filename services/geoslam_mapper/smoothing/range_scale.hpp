@@ -1,4 +1,4 @@
-// The scale of measured distances against that of odometry.
+// Scale of measured distances relative to odometry's scale.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Where landmarks alone place the vehicle at a time.
+/// Position of the vehicle at a time, from landmarks alone.
 struct LocatedKeyframe {
   model::Utime utime = 0;
   geometry::SE2 map_T_vehicle;
@@ -25,14 +25,14 @@ struct LocatedKeyframe {
   }
 };
 
-/// Distances that a laser or a detector measures may all be too short or too long by the same
-/// share: a trunk is seen from its front, a clock is off by some ppm. No landmark shows it, since
-/// the whole map is smaller then. Odometry does, if its own scale is known better: the ratio of the
-/// two is estimated by linear regression of motions, with priors for the scale of either.
+/// Distances from a laser or a detector may all be wrong by the same ratio: a trunk is seen from
+/// its front, a clock is off by some ppm. Landmarks cannot show it, since the whole map scales with
+/// it. Odometry can, if its own scale is known better: the ratio of the two is estimated by linear
+/// regression of motions, with priors for both scales.
 ///
 /// The map is kept in the units of the landmarks, which are hundreds of times more precise than
-/// odometry within a drive; odometry is multiplied by odometry_factor() as it comes, and the map
-/// by map_factor() as it is given out. So the map never bends when the estimate changes.
+/// odometry within a drive; odometry is multiplied by odometry_factor() on input, and the map by
+/// map_factor() on output. So a change of the estimate never bends the map.
 class RangeScale {
  public:
   /// Standard deviations of the scale of landmarks' distances and of odometry's (1e-3 = 1 mm per
@@ -40,15 +40,15 @@ class RangeScale {
   RangeScale(double range_sigma, double odometry_sigma)
       : range_sigma_(range_sigma), odometry_sigma_(odometry_sigma) {}
 
-  /// The last one that add() took; none before the first.
+  /// The last one that add() accepted; none before the first.
   const std::optional<LocatedKeyframe>& last() const { return last_; }
-  /// Takes the next one, with odometry since last() as it came (right perturbation); none where
-  /// there is a gap. A motion that contradicts odometry does not count.
+  /// Adds the next one, with the unscaled odometry since last() (right perturbation); none if there
+  /// is a gap. A motion that contradicts odometry is ignored.
   void add(const LocatedKeyframe& located,
            const std::optional<geometry::SE2WithCovariance>& odometry);
-  /// The same knowledge for a map that begins now.
+  /// The same estimate for a new map.
   RangeScale beside() const;
-  /// The map in use is given: its scale is known.
+  /// The map in use was given: its scale is known.
   void hold() { is_held_ = true; }
 
   /// Units of the map per metre of odometry.
@@ -73,13 +73,13 @@ class RangeScale {
   double range_sigma_;
   double odometry_sigma_;
   std::optional<LocatedKeyframe> last_;
-  double products_ = 0.0;  ///< Of motions by landmarks and by odometry, over their variance.
-  double squares_ = 0.0;   ///< Of motions by odometry.
+  double products_ = 0.0;  ///< Sum of (motion by landmarks * motion by odometry) / variance.
+  double squares_ = 0.0;   ///< Sum of (motion by odometry)^2 / variance.
   bool is_held_ = false;
 };
 
-/// Where landmarks of the map place a keyframe's last member, by a rigid fit to their positions and
-/// no prior; none with fewer than six. `positions_m`: of the associated landmarks, frame `map`.
+/// Position of a keyframe's last member from landmarks of the map, by a rigid fit without prior;
+/// none with fewer than six. `positions_m`: of the associated landmarks, frame `map`.
 std::optional<LocatedKeyframe> located_by_landmarks(
     const model::Keyframe& keyframe, std::span<const model::Association> associations,
     std::span<const Eigen::Vector2d> positions_m);

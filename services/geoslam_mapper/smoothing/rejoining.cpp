@@ -6,17 +6,18 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// The vehicle drives so far [m] from one search to the next.
+/// Path length [m] between searches.
 constexpr double kBetweenTries_m = 3.0;
-/// Two keyframes agree where the maps lie to each other as near as this, around the vehicle.
+/// Two keyframes agree if their relative poses of the maps differ by less than this, around the
+/// vehicle.
 constexpr double kAgree_m = 0.5;
 constexpr double kAgree_rad = 0.03;
-/// Places that are remembered.
+/// Number of localised keyframes that are remembered.
 constexpr std::size_t kMostFound = 12;
-/// Fewest landmarks that are in both maps.
+/// Fewest landmarks in both maps.
 constexpr std::size_t kLeastOverlap = 6;
 
-/// How far two ways of laying the maps to each other are apart around a place.
+/// Distance between two relative poses of the maps, at a point.
 bool agree(const geometry::SE2& a, const geometry::SE2& b, const Eigen::Vector2d& here_m) {
   const geometry::SE2 between = a * b.inverse();
   return (between * here_m - here_m).norm() <= kAgree_m && std::abs(between.theta()) <= kAgree_rad;
@@ -70,7 +71,7 @@ std::optional<Rejoining::Found> Rejoining::find(const model::Keyframe& keyframe,
   return found;
 }
 
-/// Of the map that the last one was found in.
+/// Uses the earlier map of the latest keyframe found.
 std::optional<Overlap> Rejoining::overlap(const Eigen::Vector2d& here_m) const {
   const Found& last = found_.back();
   Overlap overlap{last.map_id, last.map_T_left, {}};
@@ -82,7 +83,7 @@ std::optional<Overlap> Rejoining::overlap(const Eigen::Vector2d& here_m) const {
   }
   if (agreeing < kAgree) return std::nullopt;
 
-  // Each landmark has one partner; those with several are left to what tells doubles apart.
+  // One partner per landmark; landmarks with several are left to the merging of doubles.
   std::vector<MergedPair>& pairs = overlap.pairs;
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());

@@ -1,4 +1,4 @@
-// Maps that were left, found again.
+// Recognition of earlier maps.
 #pragma once
 
 #include <map>
@@ -13,28 +13,28 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// That a map which was left overlaps with the one in use.
+/// Overlap of an earlier map with the map in use.
 struct Overlap {
-  std::uint32_t map_id = 0;       ///< Of the one that was left.
-  geometry::SE2 map_T_left;       ///< Its frame in the map in use.
-  std::vector<MergedPair> pairs;  ///< Landmarks that are one: of the map in use, of the other one.
+  std::uint32_t map_id = 0;       ///< Of the earlier map.
+  geometry::SE2 map_T_left;       ///< Frame of the earlier map in the map in use.
+  std::vector<MergedPair> pairs;  ///< Common landmarks: of the map in use, of the earlier one.
 };
 
-/// Looks for the places of new keyframes in the maps that were left (GeoSLAM §7.2.3: a keyframe
-/// that matches two maps ties them). One keyframe proves nothing: three from different places must
-/// agree on how the two maps lie to each other.
+/// Localises new keyframes in the earlier maps (GeoSLAM §7.2.3: a keyframe that matches two maps
+/// ties them). One keyframe is not enough: three from different places must agree on the relative
+/// pose of the two maps.
 class Rejoining {
  public:
-  /// So many keyframes must agree.
+  /// Number of keyframes that must agree.
   static constexpr std::size_t kAgree = 3;
 
-  /// To be called after each keyframe that was fused. `associations`: of the keyframe, with
-  /// landmarks of the map in use. Cost: every few metres, one search in each map that was left and
-  /// has its graph; nothing where there is none.
+  /// Call it after each fused keyframe. `associations`: of the keyframe, with landmarks of the map
+  /// in use. Cost: every few metres one search in each earlier map with a graph; nothing if there
+  /// is none.
   std::optional<Overlap> follow(const model::Keyframe& keyframe,
                                 std::span<const model::Association> associations,
                                 const GlobalMap& map, const MapArchive& left);
-  /// Begins anew: another map is in use.
+  /// Starts anew after another map came into use.
   void reset() { found_.clear(); }
 
   /// Members of a saved state; see common/state. The indexes follow from the maps.
@@ -44,7 +44,7 @@ class Rejoining {
   }
 
  private:
-  /// A keyframe's place in a map that was left.
+  /// A keyframe localised in an earlier map.
   struct Found {
     std::uint32_t map_id = 0;
     geometry::SE2 map_T_left;
@@ -59,9 +59,9 @@ class Rejoining {
                             std::span<const model::Association> associations, const KeptMap& left);
   std::optional<Overlap> overlap(const Eigen::Vector2d& here_m) const;
 
-  std::map<std::uint32_t, constellation::ConstellationMap> index_;  ///< By map.
-  std::vector<Found> found_;                                        ///< The newest last.
-  double tried_m_ = 0.0;  ///< Path of the vehicle at the last search.
+  std::map<std::uint32_t, constellation::ConstellationMap> index_;  ///< By map number.
+  std::vector<Found> found_;                                        ///< Newest last.
+  double tried_m_ = 0.0;  ///< Path length of the vehicle at the last search.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -10,11 +10,12 @@ namespace {
 /// Most landmarks whose exact covariance is computed. It varies slowly over a part of the map that
 /// was observed at one time.
 constexpr std::size_t kMaxExact = 8;
-/// Path of landmarks that no drive of this map has seen [m]: away from all others.
+/// Path length assigned to landmarks that no drive of this map has observed [m]: far from all
+/// others.
 constexpr double kBeforeAll_m = -1e6;
 
-/// Where a landmark is, and the vehicle's path when it was seen last [m]. Two passes by one place
-/// are far from each other there: what is known of one says nothing of the other.
+/// Position of a landmark, and the vehicle's path length at its last observation [m]. Two passes by
+/// one place are distant in this space: their errors are independent.
 using PathPlace = Eigen::Vector3d;
 
 PathPlace place_of(const StoredLandmark& landmark, const PoseGraph& graph) {
@@ -25,7 +26,7 @@ PathPlace place_of(const StoredLandmark& landmark, const PoseGraph& graph) {
 
 double squared_distance(const PathPlace& a, const PathPlace& b) { return (a - b).squaredNorm(); }
 
-/// Up to `most` of the points, each the one furthest from those before it.
+/// Up to `most` of the points, each the one furthest from the points chosen before.
 std::vector<std::size_t> spread(std::span<const PathPlace> points, std::size_t most) {
   std::vector<std::size_t> chosen;
   std::vector<double> nearest(points.size(), std::numeric_limits<double>::infinity());
@@ -38,14 +39,14 @@ std::vector<std::size_t> spread(std::span<const PathPlace> points, std::size_t m
   return chosen;
 }
 
-/// Landmarks whose error the vehicle does not share.
+/// Landmarks that do not share the vehicle's error.
 struct OldLandmarks {
-  std::vector<std::size_t> numbers;  ///< Among the landmarks asked for.
+  std::vector<std::size_t> numbers;  ///< Indices in the input.
   std::vector<model::LandmarkId> ids;
   std::vector<PathPlace> places;
 };
 
-/// Of the landmarks `chosen` among the old ones, the one nearest to old landmark `i`.
+/// The chosen landmark that is nearest to old landmark `i`.
 std::size_t nearest_chosen(const OldLandmarks& old, const std::vector<std::size_t>& chosen,
                            std::size_t i) {
   std::size_t nearest = 0;
@@ -71,7 +72,7 @@ bool is_recent(const StoredLandmark& landmark, const Reference& reference, int r
 std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids,
                                        const std::optional<Reference>& reference,
                                        int recent_keyframes, const GlobalMap& map) {
-  // The local variance, and which landmarks need more.
+  // Local variances, and the list of landmarks that are not recent.
   std::vector<double> variances;
   OldLandmarks old;
   for (const model::LandmarkId id : ids) {
@@ -86,7 +87,7 @@ std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids
   }
   if (old.ids.empty()) return variances;
 
-  // The exact variance of a few.
+  // The exact variance of a few of these.
   const std::vector<std::size_t> chosen = spread(old.places, kMaxExact);
   std::vector<model::LandmarkId> chosen_ids;
   chosen_ids.reserve(chosen.size());
@@ -94,7 +95,7 @@ std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids
   const std::vector<double> exact = map.graph.relative_variances(reference->node, chosen_ids);
   if (exact.empty()) return variances;
 
-  // The others take that of the nearest of them.
+  // The others take the value of the nearest of them.
   for (std::size_t i = 0; i < old.ids.size(); ++i) {
     double& variance = variances[old.numbers[i]];
     variance = std::max(variance, exact[nearest_chosen(old, chosen, i)]);

@@ -1,4 +1,4 @@
-// A stretch of the path states less than before.
+// Reduces the information on a stretch of the path.
 #include <algorithm>
 
 #include "services/geoslam_mapper/smoothing/pose_graph.hpp"
@@ -55,7 +55,7 @@ void PoseGraph::scale_information(MotionRef ref, double share) {
   }
 }
 
-/// What is not in the solved graph, and the motions that stand for it.
+/// Relaxes dormant landmarks and the motions that represent them.
 void PoseGraph::relax_dormant(double from_m, double to_m, const ShareAlong& share_at) {
   std::set<TiedNodes> changed;
   for (auto& [id, observed] : dormant_) {

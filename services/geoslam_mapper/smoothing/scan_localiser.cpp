@@ -7,7 +7,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Beyond the sensor's range, so that a landmark at its edge is found.
+/// Margin beyond the sensor's range, so that landmarks at its edge are found.
 constexpr double kReachMargin_m = 5.0;
 
 std::vector<geometry::UncertainPoint> landmarks_around(const Eigen::Vector2d& centre_m,
@@ -31,7 +31,7 @@ std::vector<geometry::UncertainPoint> points_of(const model::LandmarkScan& scan)
   return points;
 }
 
-/// How many of the points could be matched: not more than the landmarks in the field of view.
+/// Number of points that could be matched: at most the number of landmarks in the field of view.
 std::size_t count_possible(const model::FieldOfView& view, const geometry::SE2& map_T_vehicle,
                            std::span<const geometry::UncertainPoint> reference,
                            std::size_t observed) {
@@ -42,8 +42,8 @@ std::size_t count_possible(const model::FieldOfView& view, const geometry::SE2& 
   return std::min(static_cast<std::size_t>(in_view), observed);
 }
 
-/// A pose among the landmarks near by, in the map: those share the error of the last keyframe, so
-/// the covariance is that of both.
+/// Converts a pose relative to the landmarks near by to the map: these share the error of the last
+/// keyframe, so the covariances add up.
 geometry::SE2WithCovariance in_map(
     const geometry::SE2WithCovariance& found,
     const std::optional<geometry::SE2WithCovariance>& map_T_last_base) {
@@ -70,7 +70,7 @@ std::optional<ScanPose> ScanLocaliser::locate(const model::LandmarkScan& raw,
   if (!latest_ || raw.utime <= latest_->utime) return std::nullopt;
   const auto found = register_scan(level_.levelled(raw), landmarks, motion);
 
-  // Landmarks end: odometry goes on, and its error with it.
+  // Too few landmarks: odometry continues the pose, with a growing error.
   if (!found) {
     const auto step = motion.between(latest_->utime, raw.utime);
     if (!step) return std::nullopt;
@@ -85,8 +85,8 @@ std::optional<ScanPose> ScanLocaliser::locate(const model::LandmarkScan& raw,
   return ScanPose{map_T_vehicle, false};
 }
 
-/// By odometry where it reaches from the last scan, and then few matches are enough; else by the
-/// last step and a search of rotations. None where too few detections match.
+/// From odometry's prediction since the last scan, where few matches are sufficient; else from the
+/// last step with a search of rotations. None if too few detections match.
 std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::LandmarkScan& scan,
                                                                    const LandmarkMap& landmarks,
                                                                    const Motion& motion) {
@@ -113,7 +113,7 @@ std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::
     return fits(found) ? std::optional(found) : std::nullopt;
   }
 
-  // Where next to nothing can be matched, what does match adds to odometry.
+  // With almost no possible matches, the few found add to odometry.
   const auto is_enough = [&](const geometry::Registration& found,
                              const geometry::SE2WithCovariance& guess) {
     if (fits(found)) return true;
@@ -124,7 +124,7 @@ std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::
            adds_to_odometry({reference, observed, guess, found}, gating, reach_m);
   };
 
-  // By the velocity; where the landmarks contradict it, by odometry as stated.
+  // Predicts by the velocity; if the landmarks contradict it, by odometry as stated.
   const auto by_odometry = [&](const std::optional<model::InertialMotion>& inertial)
       -> std::optional<geometry::Registration> {
     const geometry::SE2WithCovariance guess = velocity_.predict(last, *step, inertial);

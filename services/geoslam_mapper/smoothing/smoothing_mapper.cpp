@@ -12,13 +12,13 @@ namespace {
 
 constexpr state::Format kFormat{"geoslam_mapper.smoothing", 29};
 constexpr state::Format kCopyFormat{"geoslam_mapper.smoothing.copy", 1};
-/// Two keyframes contradict each other where their motion in a trial map differs from the tracked
-/// one by more than so many of its standard deviations.
+/// Two keyframes contradict each other if their motion in a trial map differs from the tracked one
+/// by more than this number of standard deviations.
 constexpr double kTrackSigmas = 4.0;
-/// Keyframes that the map in use contradicts, one after the other, from which on it is not
-/// believed: they may agree with each other.
+/// Number of successive keyframes contradicting the map in use, at which it is no longer trusted:
+/// they may agree with each other.
 constexpr std::uint32_t kContradicted = 8;
-/// Ids of maps stay positive in the 16 bit that landmark ids have for them.
+/// Map numbers stay positive in the 16 bit that landmark ids have for them.
 constexpr std::uint32_t kMostMaps = 0x7fff;
 
 bool is_finite(const model::Keyframe& keyframe) {
@@ -55,7 +55,7 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   return units_.metres(std::move(update));
 }
 
-/// In the map in use, in another one, or in none.
+/// Places it in the map in use, in another one, or in none.
 model::MapUpdate SmoothingMapper::place(const model::Keyframe& keyframe) {
   using enum model::MapUpdateStatus;
   current_.may_hand_over(may_hand_over_);
@@ -81,7 +81,7 @@ std::optional<ScanPose> SmoothingMapper::locate(const model::LandmarkScan& scan)
   return pose ? std::optional(units_.metres(*pose)) : std::nullopt;
 }
 
-/// A step of the units moves all of them.
+/// A change of the units moves all landmarks.
 std::vector<model::MapLandmark> SmoothingMapper::take_changed_landmarks() {
   std::vector<model::MapLandmark> changed =
       current_.take_changed_landmarks(kAroundVehicle_m / units_.factor());
@@ -89,7 +89,7 @@ std::vector<model::MapLandmark> SmoothingMapper::take_changed_landmarks() {
   return units_.metres(std::move(changed));
 }
 
-/// Keyframes without a place say nothing of the map.
+/// Keyframes that were not localised do not count.
 void SmoothingMapper::count_contradictions(const model::MapUpdate& update) {
   using enum model::MapUpdateStatus;
   if (update.status == kRolledBack) ++contradictions_;
@@ -104,8 +104,8 @@ std::string SmoothingMapper::malformed(const model::Keyframe& keyframe) const {
   return {};
 }
 
-/// A given map that must not change is searched in for ever. While odometry reaches back to the map
-/// in use, that map is searched in, too: another one would be a double of it.
+/// A given map that must not change stays the only one. While odometry covers the motion since the
+/// last keyframe in the map in use, that map is searched, too: another map would duplicate it.
 bool SmoothingMapper::may_try_another(const model::MapUpdate& update) const {
   using enum model::MapUpdateStatus;
   const bool is_placed = update.status == kFirstMap || update.status == kUpdated;
@@ -115,8 +115,7 @@ bool SmoothingMapper::may_try_another(const model::MapUpdate& update) const {
   return current_.is_provisional() || update.is_lost;
 }
 
-/// Each keyframe goes on with the trial or begins a new one: the keyframes that agree are
-/// successive.
+/// Each keyframe continues the trial or begins a new one: the keyframes that agree are successive.
 void SmoothingMapper::try_another(const model::Keyframe& keyframe, model::MapUpdate& update) {
   const std::uint32_t id = current_.map().landmarks.map_id() + 1;
   model::MapUpdate tried;
@@ -137,8 +136,8 @@ void SmoothingMapper::try_another(const model::Keyframe& keyframe, model::MapUpd
   adopt_trial(update);
 }
 
-/// It was localised by landmarks, where the keyframer tracked it. Where a landmark needs two
-/// keyframes, the first one leaves none, and odometry alone places the second.
+/// Landmarks localised it at the pose of the keyframer's tracking. If a landmark needs two
+/// keyframes, the first one leaves none, and odometry alone localises the second.
 bool SmoothingMapper::agrees(
     const model::Keyframe& keyframe, const model::MapUpdate& update, bool had_landmarks,
     const std::optional<geometry::SE2WithCovariance>& map_T_previous_base) const {
@@ -155,7 +154,7 @@ bool SmoothingMapper::agrees(
          std::abs(difference.theta()) <= kTrackSigmas * parameters_.predicted_sigma_rad;
 }
 
-/// The update of the keyframe that makes the trial the map in use lists all that is in it.
+/// The update of the keyframe that brings the trial into use lists all of its landmarks.
 void SmoothingMapper::adopt_trial(model::MapUpdate& update) {
   const std::uint32_t left = current_.map().landmarks.map_id();
   if (current_.is_provisional()) {
@@ -177,7 +176,7 @@ void SmoothingMapper::adopt_trial(model::MapUpdate& update) {
   for (const auto& [id, landmark] : current_.map().landmarks.all()) update.added.push_back(id);
 }
 
-/// On a copy: where the two maps contradict each other, nothing has happened.
+/// On a copy: if the two maps contradict each other, nothing changes.
 void SmoothingMapper::rejoin_left_maps(const model::Keyframe& keyframe, model::MapUpdate& update) {
   const auto overlap = rejoining_.follow(keyframe, update.associations, current_.map(), kept_maps_);
   if (!overlap) return;
@@ -211,7 +210,7 @@ model::LoopResult SmoothingMapper::take(const model::LoopClosure& closure) {
   return result;
 }
 
-/// Of another map than the one in use there is nothing to place.
+/// For another map than the one in use nothing is localised.
 void SmoothingMapper::take(const model::Existence& existence) {
   if (existence.map_id == current_.map().landmarks.map_id()) current_.take(existence);
 }

@@ -13,7 +13,7 @@ void StartLevel::begin(model::Utime utime, const std::optional<model::EkfLevel>&
 void StartLevel::add(const model::RestLevel& level) {
   if (!utime_ || *utime_ > level.rest_utime) return;
   change_.reset();
-  if (*utime_ < level.rest_from_utime) return;  // Of a later rest.
+  if (*utime_ < level.rest_from_utime) return;  // About a later rest.
 
   change_ = level.change_covariance;
   const bool is_known = !covariance_.isZero(0.0);

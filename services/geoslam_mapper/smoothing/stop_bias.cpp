@@ -4,7 +4,7 @@ namespace understory::geoslam_mapper::smoothing {
 namespace {
 
 constexpr double kShortest_s = 1.0;
-/// Sigma of the body's sway about the vertical at either end of a stop: it does not add up.
+/// Sigma of the body's rotation about the vertical at either end of a stop; it does not accumulate.
 constexpr double kSway_rad = 5e-4;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What the gyro measures while the vehicle is stationary: its bias.
+// The gyro's bias, measured while the vehicle is stationary.
 #pragma once
 
 #include <optional>
@@ -8,15 +8,15 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Sums up what the gyro shows at stops. A stationary vehicle does not rotate, so its rate is the
-/// bias; no landmark and no filter is needed for that.
+/// Sums up the gyro's rotation during stops. A stationary vehicle does not rotate, so its rate is
+/// the bias; neither landmarks nor a filter are needed.
 class StopBias {
  public:
-  /// Adds the increment that follows; only those with an IMU from a stationary vehicle count.
+  /// Adds the next increment; only those of a stationary vehicle with an IMU count.
   void add(const model::Odometry& increment);
-  /// The bias by the stops since the last clear(); none where they lasted less than a second.
+  /// The bias from the stops since the last clear(); none if they lasted less than a second.
   std::optional<MeasuredBias> measured() const;
-  /// Forgets what was summed up.
+  /// Clears the sums.
   void clear() { *this = {}; }
 
   /// Members of a saved state; see common/state.
@@ -26,10 +26,10 @@ class StopBias {
   }
 
  private:
-  double rotation_rad_ = 0.0;  ///< With the bias in it.
-  double variance_ = 0.0;      ///< White noise of that [rad^2].
+  double rotation_rad_ = 0.0;  ///< Including the bias.
+  double variance_ = 0.0;      ///< White noise of rotation_rad_ [rad^2].
   double seconds_ = 0.0;
-  double stops_ = 0.0;  ///< Number.
+  double stops_ = 0.0;  ///< Number of stops.
   bool was_stationary_ = false;
 };
 

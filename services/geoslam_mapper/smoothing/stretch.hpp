@@ -1,4 +1,4 @@
-// The factors of a stretch of the path, to be kept elsewhere.
+// The factors of a stretch of the path, for storage elsewhere.
 #pragma once
 
 #include <array>
@@ -14,14 +14,14 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Number of a node among all nodes of a drive; no two have the same.
+/// Number of a node, unique within a drive.
 enum class StretchNumber : std::uint32_t {};
 /// The number itself.
 constexpr std::uint32_t index(StretchNumber number) { return static_cast<std::uint32_t>(number); }
 
-/// What the nodes of a stretch measured, as it was before they became one: a drive that is put
-/// together again from its stretches is the graph of the drive uncut (expand()). 24 bytes for each
-/// observation, about 1 MB for a km of forest.
+/// Measurements of the nodes of a stretch before they were condensed: expand() rebuilds the graph
+/// of the uncut drive from its stretches. 24 bytes for each observation, about 1 MB per km of
+/// forest.
 struct Stretch {
   /// A keyframe, tied to its node.
   struct Keyframe {
@@ -37,7 +37,7 @@ struct Stretch {
   /// A node.
   struct Pose {
     StretchNumber number{};
-    std::uint32_t scans = 0;      ///< Of its first keyframe.
+    std::uint32_t scans = 0;      ///< At the time of condensing.
     geometry::SE2 origin_T_node;  ///< As estimated when it was condensed.
     std::vector<Keyframe> keyframes;
 
@@ -46,7 +46,7 @@ struct Stretch {
       a(s.number, s.scans, s.origin_T_node, s.keyframes);
     }
   };
-  /// A landmark, likewise.
+  /// A landmark, likewise at the time of condensing.
   struct Landmark {
     model::LandmarkId id = 0;
     Eigen::Vector2f origin_p_landmark = Eigen::Vector2f::Zero();  ///< [m]
@@ -74,8 +74,9 @@ struct Stretch {
     StretchNumber b{};
     geometry::SE2 a_T_b;  ///< As measured.
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-    double seconds = 0.0;     ///< For which the gyro's bias is in the rotation; 0: it is not.
-    double bias_rad_s = 0.0;  ///< As estimated then.
+    double seconds =
+        0.0;  ///< Duration over which the gyro's bias acts on the rotation; 0: without bias.
+    double bias_rad_s = 0.0;  ///< Estimate at that time.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
@@ -83,14 +84,15 @@ struct Stretch {
     }
   };
 
-  /// The condensed node, which is the origin; none where the nodes stayed: the origin is the map's.
+  /// The condensed node, which is the origin; none if the nodes stayed: then the origin is the
+  /// map's.
   std::optional<NodeIndex> node;
   std::vector<Pose> poses;
   std::vector<Landmark> landmarks;
   std::vector<Observation> observations;
   std::vector<Motion> motions;
 
-  /// The nodes became one: positions that were in the frame `map` are in its frame now.
+  /// After condensing: converts positions from the frame `map` to the condensed node's frame.
   void turn_to(std::span<const Retirement> retired);
 
   /// Members of a saved state; see common/state.

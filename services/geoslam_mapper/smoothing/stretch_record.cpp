@@ -1,4 +1,4 @@
-// The factors of a stretch as they are in the graph.
+// Copies the factors of a stretch out of the graph.
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -11,7 +11,7 @@ namespace {
 
 namespace plane = factor_graph::plane;
 
-/// The keyframes that are tied to a node.
+/// The keyframes tied to a node.
 std::vector<Stretch::Keyframe> keyframes_of(NodeIndex node, const Trajectory& trajectory) {
   std::vector<Stretch::Keyframe> keyframes;
   for (const Base& base : trajectory.bases()) {
@@ -40,7 +40,7 @@ void add_stretch_observations(const plane::Graph& graph,
 
 }  // namespace
 
-/// Positions in the frame `map`. Motions to nodes of earlier stretches were kept with those.
+/// Positions are in the frame `map`. Motions to nodes of earlier stretches were stored with those.
 Stretch Condensing::stretch_of(std::span<const Passed> passed, const GlobalMap& map) const {
   std::map<NodeIndex, StretchNumber> numbers;
   for (const Passed& one : waiting_) numbers[one.node] = one.number;

@@ -10,12 +10,12 @@ namespace {
 
 constexpr const char* kSubmapState = "geoslam_mapper.smoothing.submap";
 constexpr state::Format kSubmapFormat{kSubmapState, 4};
-/// Without what stood for the landmarks.
+/// Without the motions that represent the landmarks.
 constexpr state::Format kSubmapFormat3{kSubmapState, 3};
-/// Without motions, too.
+/// Also without motions.
 constexpr state::Format kSubmapFormat2{kSubmapState, 2};
 
-/// A motion as version 3 has it.
+/// A motion in version 3.
 struct Motion3 {
   FrozenMotion motion;
   std::optional<std::uint32_t> away_tie;  ///< None in submaps.
@@ -27,7 +27,7 @@ struct Motion3 {
   }
 };
 
-/// As load(), of bytes that may be of another version.
+/// Like load(), for bytes that may be of another version.
 template <typename... Values>
 bool loads(const std::string& payload, const state::Format& format, Values&... values) {
   try {

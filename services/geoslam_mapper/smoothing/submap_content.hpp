@@ -1,4 +1,4 @@
-// What the payload of a submap holds.
+// The payload of a submap.
 #pragma once
 
 #include <string>
@@ -11,24 +11,24 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// All that is needed to put a submap back, and to optimise stored submaps without the mapper.
+/// All data needed to put a submap back, and to optimise stored submaps without the mapper.
 struct SubmapContent {
-  NodeIndex node = 0;  ///< The submap's frame is this node of the graph.
+  NodeIndex node = 0;  ///< The node of the graph that is the submap's frame.
   std::vector<StoredLandmark> landmarks;
-  /// Of each landmark what nodes observed of it, those of other submaps among them.
+  /// Observations of each landmark, including those by nodes of other submaps.
   std::vector<std::vector<DormantObservation>> observed;
   AwayBases bases;
-  /// How the node lay to others when the submap was handed over, closures among them; with the
-  /// gyro's bias as it was known then. None in submaps of 0.2.0.
+  /// Motions to other nodes at the time of hand-over, including closures, with the gyro bias of
+  /// that time. None in submaps of 0.2.0.
   std::vector<FrozenMotion> motions;
-  /// What stood for the landmarks in the mapper's graph while they were away. None in submaps of
-  /// before 0.4.0.
+  /// Motions that replaced the landmarks in the mapper's graph while they were stored. None in
+  /// submaps of before 0.4.0.
   std::vector<FrozenMotion> ties;
 };
 
-/// As bytes.
+/// Encodes to bytes.
 std::string submap_payload(const SubmapContent& content);
-/// Back, also from those of 0.2.0. Throws std::invalid_argument where the bytes are none.
+/// Decodes, also the format of 0.2.0. Throws std::invalid_argument on other bytes.
 SubmapContent submap_content(const std::string& payload);
 
 }  // namespace understory::geoslam_mapper::smoothing

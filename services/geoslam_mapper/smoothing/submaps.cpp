@@ -12,21 +12,21 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// The vehicle drives so far [m] from one look around to the next.
+/// Path length [m] between searches for near and distant submaps.
 constexpr double kBetweenLooks_m = 10.0;
-/// A submap's landmarks may lie so far [m] from its node, beside the sensor's range.
+/// Largest distance of a submap's landmarks from its node [m], beside the sensor's range.
 constexpr double kExtent_m = 40.0;
-/// What comes back is not given away before it is so much further [m].
+/// Hysteresis between loading and handing over [m].
 constexpr double kHysteresis_m = 60.0;
-/// What is so much further [m] than what comes back leaves the solved graph, so many at a time; it
-/// is in it again before it comes nearer than so much beyond that.
+/// Distance beyond the loading distance at which nodes are frozen [m], and the number frozen at a
+/// time; nodes thaw before the vehicle is nearer than the third distance beyond it.
 constexpr double kFrozenBeyond_m = 500.0;
 constexpr double kThawedBeyond_m = 150.0;
 constexpr std::size_t kFrozenTogether = 20;
-/// Most submaps that are wanted at a time.
+/// Most submaps requested at a time.
 constexpr std::size_t kMostWanted = 4;
 
-/// Information that all observers together have, in the frame of a node.
+/// Joint information of all observers, in the frame of a node.
 Eigen::Matrix2d information_in(NodeIndex node, std::span<const DormantObservation> observed,
                                const PoseGraph& graph) {
   Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
@@ -56,7 +56,7 @@ bool Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   return ask_for_next() || give_next_away(newest, utime, map);
 }
 
-/// What has come near, and how far is far. True where it solved.
+/// Finds near submaps and sets the hand-over distance. True if it solved the graph.
 bool Submaps::look_around(const model::FieldOfView& field_of_view, NodeIndex newest,
                           GlobalMap& map) {
   const Eigen::Vector2d vehicle_m = map.graph.pose(newest).translation();

@@ -1,4 +1,4 @@
-// Parts of the map that are kept elsewhere.
+// Parts of the map that are stored elsewhere.
 #pragma once
 
 #include <deque>
@@ -14,37 +14,37 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Keeps what the mapper holds to the ground around the vehicle. A submap is a condensed node with
-/// the dormant landmarks that it observed first and the bases of its keyframes, in its frame. Far
-/// from the vehicle it is given away, whole; in the graph stay the node and its motions, so that
-/// every estimate is what it would be with the submap there. It comes back before the vehicle can
-/// see any of it.
+/// Limits the mapper's memory to the map around the vehicle. A submap is a condensed node with the
+/// dormant landmarks that it observed first and the bases of its keyframes, in its frame. Far from
+/// the vehicle the whole submap is handed over; the node and its motions stay in the graph, so
+/// every estimate is the same as with the submap. It is loaded again before the vehicle can see any
+/// of it.
 class Submaps {
  public:
   /// `parameters` gives `hand_over_m`; 0: nothing is handed over.
   explicit Submaps(const SmoothingMapperParameters& parameters)
       : hand_over_m_(parameters.hand_over_m) {}
 
-  /// Nothing more is handed over while this is false; what is away comes back as before.
+  /// While false, nothing is handed over; stored submaps are loaded as before.
   void may_hand_over(bool may) { may_hand_over_ = may; }
-  /// A stretch of the path became this node.
+  /// A stretch of the path was condensed into this node.
   void condensed(NodeIndex node) { here_.push_back({node, std::nullopt}); }
-  /// To be called after accepted keyframes. One submap goes or is wanted back at each: what the
-  /// vehicle comes near first, else what is far. True where there is one; the solved graph is as
-  /// it was, unless it froze or thawed nodes. Cost: one distance for each submap that is here, and
-  /// what goes; every few metres one for each that is away.
+  /// Call it after accepted keyframes. Each time at most one submap is requested or handed over;
+  /// loading near submaps has priority over handing over distant ones. True if there is one; the
+  /// solved graph is unchanged, unless nodes were frozen or thawed. Cost: one distance per submap
+  /// in memory, and the submap handed over; every few metres one distance per stored submap.
   bool follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
               GlobalMap& map);
 
-  /// What was given away since the last call.
+  /// Submaps handed over since the last call.
   std::vector<model::Submap> take_given_away() { return std::exchange(given_away_, {}); }
-  /// What is wanted back and has not come yet, in the order in which it is needed.
+  /// Submaps that are requested and not loaded yet, in order of need.
   const std::vector<model::SubmapId>& wanted() const { return wanted_; }
-  /// Puts a submap back. Returns why not, where it is not away or not as it was; the map is
-  /// unchanged then. What its landmarks tell is in the graph already, which does not change. Solves
-  /// where a node of it is frozen.
+  /// Puts a submap back. Returns the reason, with the map unchanged, if it is not handed over or
+  /// has changed. The information of its landmarks is in the graph already, which does not change.
+  /// Solves if a node of it is frozen.
   std::string bring_back(const model::Submap& submap, GlobalMap& map);
-  /// Where all that was ever given away is, in order of id.
+  /// Poses of all submaps ever handed over, in order of id.
   std::vector<model::SubmapPose> poses(const PoseGraph& graph) const;
   /// The node of a submap; none where there is no such submap.
   std::optional<NodeIndex> node_of(model::SubmapId id) const;
@@ -57,17 +57,17 @@ class Submaps {
   }
 
  private:
-  /// A submap that the map holds.
+  /// A submap in memory.
   struct Here {
     NodeIndex node = 0;
-    std::optional<model::SubmapId> was;  ///< When it was away last.
+    std::optional<model::SubmapId> was;  ///< Its id when it was last stored.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
       a(s.node, s.was);
     }
   };
-  /// A submap that is kept elsewhere.
+  /// A submap that is stored elsewhere.
   struct Away {
     NodeIndex node = 0;
     model::SubmapId id = 0;
@@ -89,13 +89,13 @@ class Submaps {
   bool may_hand_over_ = true;
   std::vector<Here> here_;
   std::deque<Away> away_;                ///< In order of id.
-  std::vector<model::SubmapId> coming_;  ///< To be asked for, the nearest first.
+  std::vector<model::SubmapId> coming_;  ///< To be requested, the nearest first.
   std::vector<model::SubmapId> wanted_;
   std::vector<model::Submap> given_away_;
   model::SubmapId next_id_ = 1;
-  std::size_t unfreezable_ = 0;  ///< Submaps that could not leave the solved graph.
-  double looked_m_ = 0.0;        ///< Path of the vehicle when it looked around.
-  std::optional<double> far_m_;  ///< From here on submaps go; none before the first look.
+  std::size_t unfreezable_ = 0;  ///< Submaps that could not be frozen.
+  double looked_m_ = 0.0;        ///< Path length of the vehicle at the last look_around().
+  std::optional<double> far_m_;  ///< Hand-over distance; none before the first look_around().
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -1,4 +1,4 @@
-// Where every keyframe was, and which of them were at one place.
+// Poses of all keyframes, and which of them share a viewpoint.
 #pragma once
 
 #include <map>
@@ -13,17 +13,17 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// A keyframe's base, rigidly tied to a node: nothing else measures it.
+/// A keyframe's base, rigidly tied to a node without other measurements.
 struct Base {
   NodeIndex node = 0;
   std::uint64_t sequence = 0;  ///< Of the keyframe.
   model::Utime utime = 0;
   geometry::SE2WithCovariance centre_T_base;  ///< In the node's frame.
   /// Mean of the keyframe's members, in the node's frame: the position of the keyframe, three times
-  /// as exact as the base alone.
+  /// as accurate as the base alone.
   geometry::SE2 centre_T_middle;
   bool is_origin = false;  ///< The origin of the map: known exactly.
-  /// Its node has another keyframe's viewpoint: it is kept for a while only.
+  /// Its node has another keyframe's viewpoint: it is kept only for a while.
   bool is_spare = false;
 
   /// Members of a saved state; see common/state.
@@ -38,7 +38,7 @@ Base base_of(const model::Keyframe& keyframe, NodeIndex node, bool is_origin = f
 /// Mean of the members' poses, in the keyframe's centre frame.
 geometry::SE2 middle_of(const model::Keyframe& keyframe);
 
-/// Bases and viewpoints of a node that are kept elsewhere.
+/// Bases and viewpoints of a node that are stored elsewhere.
 struct AwayBases {
   std::vector<Base> bases;  ///< In order of time.
   std::vector<geometry::SE2> centre_T_viewpoints;
@@ -50,13 +50,13 @@ struct AwayBases {
   }
 };
 
-/// The bases of accepted keyframes, and an index of the viewpoints that differ: a keyframe from a
-/// viewpoint that the graph has already is folded into its node, so that a stationary vehicle does
-/// not grow the graph. Where the vehicle goes a known way again, or stands, the oldest bases are
-/// forgotten. Poses follow the graph, which is passed in.
+/// The bases of accepted keyframes, and an index of distinct viewpoints: a keyframe from a known
+/// viewpoint is folded into its node, so a stationary vehicle does not enlarge the graph. When the
+/// vehicle repeats a way or stands, the oldest bases are deleted. Poses follow the graph, which is
+/// passed in.
 class Trajectory {
  public:
-  /// Most bases that are kept beside the viewpoints: an hour and more on known ground.
+  /// Most bases that are kept beside the viewpoints: more than an hour on known ground.
   static constexpr std::size_t kMostSpare = 4096;
 
   /// `parameters` gives fold_distance_m and fold_angle_rad.
@@ -65,42 +65,43 @@ class Trajectory {
 
   /// Adds the base of an accepted keyframe. O(viewpoints of its node).
   void add(const Base& base, const PoseGraph& graph);
-  /// The keyframe that is added next is tied to those before it by odometry alone.
+  /// Marks the next keyframe as tied to earlier ones by odometry alone.
   void tear();
-  /// Whether odometry alone ties two keyframes together, which are given by their numbers (size()
-  /// when they were new, in any order): then what they observed does not share one error.
+  /// Whether odometry alone ties two keyframes together, given by their numbers (size() when they
+  /// were new, in any order): then their observations do not share one error.
   bool is_torn(std::uint32_t a, std::uint32_t b) const;
-  /// Adds a base that is no viewpoint: where the map stays as it is.
+  /// Adds a base that is no viewpoint, when the map stays unchanged.
   void add_spare(Base base);
-  /// Ties the bases of a node that is taken out of the graph to the node that has its place.
-  /// O(bases since the node was added).
+  /// Moves the bases of a removed node to the node that replaces it. O(bases since the node was
+  /// added).
   void hand_over(const Retirement& retirement);
-  /// Ties bases and viewpoints of nodes that became one to that one. O(bases since the nodes were
+  /// Moves bases and viewpoints of condensed nodes to the new node. O(bases since the nodes were
   /// added).
   void tie(std::span<const Retirement> retired, const PoseGraph& graph);
-  /// Takes out bases and viewpoints of a node, but for the map's origin and the last one. O(bases).
+  /// Removes and returns bases and viewpoints of a node, except the map's origin and the last one.
+  /// O(bases).
   AwayBases put_away(NodeIndex node);
   /// Adds them again. O(bases).
   void bring_back(NodeIndex node, AwayBases away, const PoseGraph& graph);
-  /// Adds all of another trajectory, whose nodes have numbers from `first` on in `graph` now. Its
-  /// origin is a base like the others. O(bases).
+  /// Adds all of another trajectory, whose nodes now have numbers from `first` on in `graph`. Its
+  /// origin becomes an ordinary base. O(bases).
   void absorb(Trajectory other, NodeIndex first, const PoseGraph& graph);
-  /// Brings the index of viewpoints to where the graph's last updates moved the nodes, but for
-  /// viewpoints that are within kStale_m of it.
+  /// Moves the index of viewpoints to the nodes' latest estimates, except viewpoints that are
+  /// within kStale_m of their entry.
   void follow(const PoseGraph& graph);
 
-  /// The bases that are kept, in order of time.
+  /// The bases in memory, in order of time.
   std::span<const Base> bases() const { return bases_; }
   /// Number of accepted keyframes.
   std::uint32_t size() const { return accepted_; }
-  /// The last accepted keyframe's base; there must be one.
+  /// The last accepted keyframe's base; it must exist.
   const Base& last() const { return bases_.back(); }
   /// map_T_base at the present estimate.
   geometry::SE2 pose(const Base& base, const PoseGraph& graph) const;
   /// Whether the vehicle stayed within the folding distance and angle during the keyframe.
   bool is_stationary(const model::Keyframe& keyframe) const;
-  /// The node of the nearest viewpoint within the folding distance and angle; none where the
-  /// viewpoint is a new one, or a condensed node's. `map_T_middle`: see middle_of().
+  /// The node of the nearest viewpoint within the folding distance and angle; none for a new
+  /// viewpoint, or one of a condensed node. `map_T_middle`: see middle_of().
   std::optional<NodeIndex> revisited(const geometry::SE2& map_T_middle,
                                      const PoseGraph& graph) const;
   /// Calls f(node, distance [m]) for the nodes with a viewpoint within `radius_m` of `position_m`;
@@ -114,34 +115,34 @@ class Trajectory {
       if (distance_m < radius_m) f(viewpoint.node, distance_m);
     });
   }
-  /// The first keyframe's base in the frame of its node, turned round, where that base is the map's
-  /// origin; none where the map was given.
+  /// The inverse of the first keyframe's base in its node's frame, if that base is the map's
+  /// origin; none if the map was given.
   std::optional<geometry::SE2WithCovariance> origin_T_first() const;
-  /// Moves the bases of keyframes up to `utime` by `by_m`, frame `map`, against their nodes.
+  /// Moves the bases of keyframes up to `utime` by `by_m`, frame `map`, relative to their nodes.
   void keep_in_place(model::Utime utime, const Eigen::Vector2d& by_m, const PoseGraph& graph);
-  /// A node's pose with the covariance that the graph has of it, as it counts from the origin.
+  /// Converts a node's marginal covariance in the graph to one relative to the map's origin.
   geometry::SE2WithCovariance from_origin(const geometry::SE2WithCovariance& map_T_centre) const;
-  /// A node's pose with its marginal covariance, which counts from the map's origin.
+  /// A node's pose with its marginal covariance relative to the map's origin.
   geometry::SE2WithCovariance centre_from_origin(NodeIndex node, const PoseGraph& graph) const;
 
-  /// Indexes the viewpoints anew, after a load. Throws std::out_of_range where a base or a
+  /// Rebuilds the index of viewpoints after a load. Throws std::out_of_range if a base or a
   /// viewpoint has no node in the graph.
   void rebuild_index(const PoseGraph& graph);
-  /// Members of a saved state; see common/state. rebuild_index() makes the rest from them.
+  /// Members of a saved state; see common/state. rebuild_index() computes the rest.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.bases_, self.accepted_, self.torn_, self.viewpoints_, self.free_viewpoints_);
   }
 
  private:
-  /// Largest distance of a viewpoint from its place in the index [m].
+  /// Largest distance of a viewpoint from its entry in the index [m].
   static constexpr double kStale_m = 0.1;
 
   /// A place from which a node's landmarks were observed.
   struct Viewpoint {
     NodeIndex node = 0;
     geometry::SE2 centre_T_middle;
-    bool is_free = false;  ///< Its node is gone.
+    bool is_free = false;  ///< Its node was removed.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
@@ -163,17 +164,17 @@ class Trajectory {
   double fold_angle_rad_;
   std::vector<Base> bases_;
   std::uint32_t accepted_ = 0;
-  std::vector<std::uint32_t> torn_;  ///< Keyframes before which it is, ascending.
-  std::size_t spare_ = 0;            ///< Bases that are.
+  std::vector<std::uint32_t> torn_;  ///< Keyframes after a call of tear(), ascending.
+  std::size_t spare_ = 0;            ///< Number of spare bases.
   std::vector<Viewpoint> viewpoints_;
   std::vector<std::uint32_t> free_viewpoints_;
-  /// A node's viewpoints, and where the index has them.
+  /// A node's viewpoints, and its position in the index.
   struct IndexedNode {
     std::vector<std::uint32_t> viewpoints;
     geometry::SE2 indexed_at;
     double lever_m = 0.0;  ///< Of the viewpoint that is furthest from the node's centre.
   };
-  std::map<NodeIndex, IndexedNode> indexed_;  ///< Where there are any.
+  std::map<NodeIndex, IndexedNode> indexed_;  ///< Only nodes that have any.
   ViewpointGrid grid_;                        ///< Of the viewpoints.
 };
 

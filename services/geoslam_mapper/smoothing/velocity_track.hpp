@@ -13,7 +13,7 @@ namespace understory::geoslam_mapper::smoothing {
 struct VelocityState {
   Eigen::Vector4d mean = Eigen::Vector4d::Zero();
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-  /// Of the pose's error (rows: x, y, theta) with theirs.
+  /// Covariance of the pose's error (rows: x, y, theta) with that of the state.
   Eigen::Matrix<double, 3, 4> with_pose = Eigen::Matrix<double, 3, 4>::Zero();
 
   /// Members of a saved state; see common/state.
@@ -23,24 +23,24 @@ struct VelocityState {
   }
 };
 
-/// A Kalman filter of the velocity and the accelerometer's bias beside the pose that registration
-/// finds. Between scans the IMU carries them on: of a step that wheels state with centimetres it
-/// leaves less than a millimetre open. Owns velocity and bias; the pose is its user's.
+/// A Kalman filter of the velocity and the accelerometer's bias beside the pose from registration.
+/// Between scans the IMU propagates them: the uncertainty of a step is below a millimetre, against
+/// centimetres by wheels. Owns velocity and bias; the caller owns the pose.
 class VelocityTrack {
  public:
-  /// Where the next scan is, from the pose of the last one (right perturbation). `step` is the same
-  /// motion by odometry: the rotation is its, and where the velocity is not known, all. `inertial`
-  /// is the motion by the IMU, where there is one.
+  /// Predicted pose of the next scan, from the pose of the last one (right perturbation). `step`:
+  /// the motion by odometry; it gives the rotation, and the whole motion while the velocity is
+  /// unknown. `inertial`: the motion by the IMU, if there is one.
   geometry::SE2WithCovariance predict(const geometry::SE2WithCovariance& map_T_last,
                                       const geometry::SE2WithCovariance& step,
                                       const std::optional<model::InertialMotion>& inertial);
-  /// The pose of that scan as registration found it from the prediction. False where it is farther
-  /// from it than one in 10,000: the IMU or the odometry is not as stated, and the velocity is
-  /// forgotten.
+  /// Updates with the pose of that scan by registration. False if its distance from the prediction
+  /// exceeds the limit (one in 10,000): IMU or odometry is not as stated, and the velocity is
+  /// reset.
   bool update(const geometry::SE2WithCovariance& map_T_scan);
-  /// The last scan's pose is known from elsewhere now.
+  /// The last scan's pose was set from another source.
   void set_pose();
-  /// Nothing is known.
+  /// Resets the velocity and the bias.
   void forget() { now_.reset(); }
 
   /// Members of a saved state; see common/state.
@@ -57,7 +57,7 @@ class VelocityTrack {
                 const geometry::SE2WithCovariance& map_T_last);
 
   std::optional<VelocityState> now_;
-  geometry::SE2WithCovariance predicted_;  ///< Of the scan that update() is told of.
+  geometry::SE2WithCovariance predicted_;  ///< Predicted pose of the scan for update().
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -1,4 +1,4 @@
-// Viewpoints by their position.
+// Index of viewpoints by position.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,11 +11,11 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Numbered points in square cells of 10 m: small moves of many points change no cell. Every change
-/// costs what it touches.
+/// Numbered points in square cells of 10 m: small moves of points rarely change a cell. Each change
+/// costs as much as it touches.
 class ViewpointGrid {
  public:
-  /// Adds the point, or moves it.
+  /// Adds or moves a point.
   void put(std::uint32_t number, const Eigen::Vector2d& position_m) {
     const std::uint64_t cell = cell_of(position_m);
     if (cells_of_.size() <= number) cells_of_.resize(number + 1);
@@ -25,7 +25,7 @@ class ViewpointGrid {
     cells_of_[number] = cell;
   }
 
-  /// Takes the point out, if it is there.
+  /// Removes a point, if it is there.
   void remove(std::uint32_t number) {
     if (number >= cells_of_.size() || !cells_of_[number]) return;
     const auto cell = cells_.find(*cells_of_[number]);
@@ -34,8 +34,8 @@ class ViewpointGrid {
     if (cell->second.empty()) cells_.erase(cell);
   }
 
-  /// Calls f(number) for every point of the cells within `radius_m` of `centre_m`, and for some
-  /// beyond.
+  /// Calls f(number) for every point of the cells within `radius_m` of `centre_m`; also for some
+  /// points beyond.
   template <typename F>
   void for_each_near(const Eigen::Vector2d& centre_m, double radius_m, F&& f) const {
     const Eigen::Vector2d reach(radius_m, radius_m);
@@ -65,7 +65,7 @@ class ViewpointGrid {
   }
 
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
-  std::vector<std::optional<std::uint64_t>> cells_of_;  ///< By number; none: not there.
+  std::vector<std::optional<std::uint64_t>> cells_of_;  ///< By number; none: not in the grid.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing
