@@ -1,4 +1,4 @@
-// The associator on the bus.
+// Connects the associator to the bus.
 #pragma once
 
 #include <string>
@@ -17,8 +17,8 @@ struct AssociatorChannels {
       all.out("TRACKED_LANDMARKS", "the consistent detections, with track ids");
 };
 
-/// The process: its name, its channels and how to make its adapter. The stage is made when the
-/// service is bound, by the parameters that are then in force.
+/// The service: its name, its channels and the factory of its adapter. The stage is made when the
+/// service is bound, with the parameters of that time.
 bus::Service associator_service(const AssociatorChannels& channels = {});
 
 }  // namespace understory::associator

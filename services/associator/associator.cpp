@@ -34,7 +34,7 @@ std::optional<model::TrackedScan> Associator::add(const model::LandmarkScan& sta
   std::vector<Observation> observations = usable_observations(scan);
   counters_.detections_unusable += scan.detections.size() - observations.size();
 
-  // Where the vehicle is in the frame of the tracks.
+  // Pose of the vehicle in the frame of the tracks.
   Localisation located = locate(observations, scan);
   if (!located.fits) locate_rescaled(stated, observations, located);
   if (!located.fits) {
@@ -44,11 +44,11 @@ std::optional<model::TrackedScan> Associator::add(const model::LandmarkScan& sta
   }
   misfits_ = 0;
 
-  // Which observation is which track.
+  // Association of observations and tracks.
   const geometry::SE2WithCovariance pose = pose_of(located);
   const auto matches = match(tracks_.tracks(), observations, pose, parameters_);
 
-  // Noise, the vehicle's motion and the tracks learn from it.
+  // Updates the noise, the vehicle's motion and the tracks.
   noise_.add(stated, numbers_of(observations, matches, stated));
   motion_.set_scan(scan.utime, local_T_vehicle_.inverse() * pose.mean);
   local_T_vehicle_ = pose.mean;
@@ -57,8 +57,8 @@ std::optional<model::TrackedScan> Associator::add(const model::LandmarkScan& sta
   return tracked_scan(observations, ids, noise_.corrected(stated));
 }
 
-/// Stated covariances that are far too small or large let no scan fit. Takes the place of
-/// observations and result where other noise explains the scan.
+/// With stated covariances that are far too small or large no scan fits. Replaces observations and
+/// result if the scan fits with other noise.
 void Associator::locate_rescaled(const model::LandmarkScan& stated,
                                  std::vector<Observation>& observations, Localisation& located) {
   for (const double factor : noise_.tries()) {
@@ -74,7 +74,7 @@ void Associator::locate_rescaled(const model::LandmarkScan& stated,
   }
 }
 
-/// The number of each detection's track; an unmatched observation will begin one.
+/// The number of each detection's track; an unmatched observation gets the number of a new track.
 std::vector<std::uint64_t> Associator::numbers_of(const std::vector<Observation>& observations,
                                                   const std::vector<Match>& matches,
                                                   const model::LandmarkScan& scan) const {
@@ -124,8 +124,8 @@ Localisation Associator::locate(const std::vector<Observation>& observations,
   return located;
 }
 
-/// Passing traffic or a burst of false detections: the next scan is more likely to fit than all
-/// landmarks are to have disappeared (docs/decisions/041-scans-that-fit-no-track.md).
+/// After passing traffic or a burst of false detections the next scan is likely to fit; the
+/// disappearance of all landmarks is less likely (docs/decisions/041-scans-that-fit-no-track.md).
 bool Associator::pass_over() {
   counters_.last_reason = "a scan fitted no track";
   if (tracks_.tracks().empty() || ++misfits_ > parameters_.max_misfits) return false;

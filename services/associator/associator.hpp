@@ -1,4 +1,5 @@
-// Which detection is which landmark, from scan to scan ("Association Node", vehicle stack §3.2.2).
+// Association of detections with landmarks, from scan to scan ("Association Node", vehicle stack
+// §3.2.2).
 #pragma once
 
 #include <cstdint>
@@ -23,52 +24,51 @@ struct AssociatorCounters {
   std::uint64_t scans = 0;                 ///< Received.
   std::uint64_t scans_refused = 0;         ///< Late or repeated.
   std::uint64_t scans_passed_over = 0;     ///< Fitted no track; the tracks were kept.
-  std::uint64_t scans_lost = 0;            ///< Fitted no track once more; all tracks began anew.
+  std::uint64_t scans_lost = 0;            ///< Fitted no track again; all tracks began anew.
   std::uint64_t scans_without_motion = 0;  ///< Predicted by the last motion alone.
   std::uint64_t detections = 0;            ///< Received.
   std::uint64_t detections_unusable = 0;   ///< Not finite, or without a covariance.
   std::uint64_t published = 0;             ///< Detections with a track id.
   std::uint64_t ambiguous = 0;             ///< Matched, but not published.
   std::uint64_t tracks_confirmed = 0;      ///< Tracks that got an id.
-  std::uint64_t searches = 0;  ///< Scans for which the largest consistent set was sought.
-  std::string last_reason;     ///< Why the last scan was not used.
+  std::uint64_t searches = 0;              ///< Scans with a search of the largest consistent set.
+  std::string last_reason;                 ///< Why the last scan was not used.
 };
 
 /// Gives the detections of consistent landmarks an id that lasts as long as the track.
 ///
-/// It works in the frame `local`, which drifts slowly. All inputs come in order of time; what
-/// cannot be used is counted, never thrown.
+/// It works in the frame `local`, which drifts slowly. All inputs come in order of time; invalid
+/// input is counted and throws no exception.
 class Associator {
  public:
-  /// Throws std::invalid_argument where `method` names none.
+  /// Throws std::invalid_argument if `method` is unknown.
   explicit Associator(const AssociatorParameters& parameters);
 
-  /// Motion of the vehicle; it must come before the scan at its end to be of use.
+  /// Motion of the vehicle; it must arrive before the scan at its end.
   void add(const model::Odometry& increment) { motion_.add(increment); }
   /// The filter's pose at the last scan: its velocity and biases predict the next motion. It never
   /// changes a track.
   void add(const model::EkfPose& pose) { motion_.add(pose); }
-  /// The consistent landmarks of a scan (perhaps none), with covariances as the scans themselves
-  /// show them where they contradict the stated ones (DetectionNoise). Nothing for a late or
-  /// repeated scan; one that is more than 10 s earlier than the last one starts the tracks anew
-  /// (the clock was set back).
+  /// The consistent landmarks of a scan (perhaps none). Covariances are estimated from the scans if
+  /// the stated ones contradict them (DetectionNoise). None for a late or repeated scan; a scan
+  /// more than 10 s earlier than the last one starts the tracks anew (the clock was set back).
   std::optional<model::TrackedScan> add(const model::LandmarkScan& scan);
 
   /// Counts for HEALTH.
   const AssociatorCounters& counters() const { return counters_; }
-  /// True where the scans contradict the covariances of LANDMARKS, until what replaces them is
-  /// settled.
+  /// Whether the scans contradict the covariances of LANDMARKS and the estimate that replaces them
+  /// has not settled yet.
   bool is_noise_misstated() const { return noise_.is_adjusting(); }
   /// Number of tracks, consistent or not.
   std::size_t track_count() const { return tracks_.tracks().size(); }
 
   /// The whole state as bytes, in the format "associator" of common/state.
   std::string save() const;
-  /// Throws std::invalid_argument on bytes that save() did not make; the state is then as before.
+  /// Throws std::invalid_argument on other bytes than those of save(); the state is then unchanged.
   void load(const std::string& bytes);
 
   /// Members of a saved state; see common/state. The parameters are configuration, and the counters
-  /// are of this process.
+  /// restart with the process.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.tracks_, self.noise_, self.motion_, self.local_T_vehicle_, self.misfits_,
@@ -96,8 +96,8 @@ class Associator {
   TrackList tracks_;
   model::DetectionNoise noise_;
   MotionPredictor motion_;
-  geometry::SE2 local_T_vehicle_;  ///< At the last scan that was placed.
-  int misfits_ = 0;                ///< Scans in a row that fitted no track.
+  geometry::SE2 local_T_vehicle_;  ///< At the last scan that was located.
+  int misfits_ = 0;                ///< Successive scans that fitted no track.
   std::uint64_t next_sequence_ = 0;
   AssociatorCounters counters_;
 };

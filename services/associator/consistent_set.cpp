@@ -14,11 +14,12 @@ using Set = std::bitset<kMaxPairs>;
 
 /// A possible pair.
 struct Pair {
-  double off_m = 0.0;  ///< Distance from the position by the guess.
+  double off_m = 0.0;  ///< Distance from the position predicted by the guess.
   ConsistencyPair ends;
 };
 
-/// Largest clique; ties go to the set found first, so results do not depend on the platform.
+/// Largest clique; of equal sets the first one found is kept, so results do not depend on the
+/// platform.
 class CliqueSearch {
  public:
   CliqueSearch(const std::vector<Set>& adjacent, int max_nodes)
@@ -49,7 +50,7 @@ class CliqueSearch {
       }
     }
 
-    // Branch on the vertices of the highest colour first.
+    // Branches on the vertices of the highest colour first.
     for (std::size_t k = order.size(); k-- > 0;) {
       if (current_.size() + colour[k] <= best_.size()) return;
       const std::size_t v = order[k];
@@ -102,7 +103,7 @@ std::vector<Pair> possible_pairs(std::span<const ConsistencyPoint> reference,
   return pairs;
 }
 
-/// Which pairs one rigid motion can explain together.
+/// Pairs that fit one rigid motion together.
 std::vector<Set> compatibility(const std::vector<Pair>& pairs,
                                std::span<const ConsistencyPoint> reference,
                                std::span<const ConsistencyPoint> observed, double sigmas) {

@@ -1,4 +1,4 @@
-// The largest set of point pairs that one rigid motion explains.
+// The largest set of point pairs that fits one rigid motion.
 #pragma once
 
 #include <cstdint>
@@ -21,10 +21,11 @@ struct ConsistencyGate {
   double sigmas = 4.0;        ///< For the difference of two distances.
   double shift_m = 2.0;       ///< Largest error of the guess: translation.
   double rotation_rad = 0.5;  ///< Largest error of the guess: heading.
-  int max_nodes = 20000;      ///< Nodes of the search tree; then the best set so far is taken.
+  int max_nodes =
+      20000;  ///< Nodes of the search tree; beyond this the best set so far is returned.
 };
 
-/// A reference point and the observed point that it is taken for, as indices.
+/// A reference point and the observed point paired with it, as indices.
 struct ConsistencyPair {
   std::uint32_t reference = 0;
   std::uint32_t observed = 0;

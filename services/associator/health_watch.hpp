@@ -1,4 +1,4 @@
-// What HEALTH says of the associator beside faults of single messages.
+// HEALTH of the associator, beside faults of single messages.
 #pragma once
 
 #include <array>
@@ -9,9 +9,9 @@
 
 namespace understory::associator {
 
-/// When the associator is not well. Ranges and meanings: describe().
+/// Limits of the associator's health conditions. Ranges and meanings: describe().
 struct HealthParameters {
-  int min_detections = 3;       ///< A scan with fewer says nothing.
+  int min_detections = 3;       ///< A scan with fewer is ignored.
   int first_within_scans = 30;  ///< With detections; before the first association.
   bus::ConditionLimits lost{20, 8};
   bus::ConditionLimits refused{20, 10};
@@ -20,20 +20,20 @@ struct HealthParameters {
 /// Adds the parameters to the table.
 void describe(HealthParameters& parameters, bus::ParameterTable& table);
 
-/// Judges the associator by its latest scans. `lost`: detections come and nothing of them is
-/// associated; at the start it has the time that tracks need to be confirmed. `input_refused`:
-/// scans that are late. `noise_misstated`: scans contradict the covariances that LANDMARKS states,
-/// and those that they show are used but not yet settled.
+/// Derives the associator's health from its latest scans. `lost`: detections arrive and none is
+/// associated; at the start the time for the confirmation of tracks is allowed. `input_refused`:
+/// late scans. `noise_misstated`: scans contradict the covariances of LANDMARKS, and the estimated
+/// covariances in use have not settled yet.
 class HealthWatch {
  public:
-  /// All is well so far.
+  /// No condition is raised.
   explicit HealthWatch(const HealthParameters& parameters = {});
 
-  /// A scan, with the associator's counts before and after it.
-  /// `is_misstated`: whether the stated noise is replaced by one that is not settled.
+  /// A scan, with the associator's counts before and after it. `is_misstated`: the stated noise is
+  /// replaced by an estimate that has not settled yet.
   void add(const model::LandmarkScan& scan, const AssociatorCounters& before,
            const AssociatorCounters& after, bool is_misstated = false);
-  /// What to show.
+  /// The conditions for HEALTH.
   std::array<bus::WatchedCondition, 3> conditions() const { return {lost_, refused_, misstated_}; }
 
   /// Members of a saved state; see common/state. The parameters are configuration.

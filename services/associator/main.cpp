@@ -1,4 +1,4 @@
-// The associator as a process. Its channels: AssociatorChannels in adapter.hpp, and --help.
+// The associator's process. Its channels: AssociatorChannels in adapter.hpp, and --help.
 #include "services/associator/adapter.hpp"
 
 int main(int argc, char** argv) {

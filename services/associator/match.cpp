@@ -12,9 +12,9 @@ namespace {
 
 constexpr double kGateFloor_m = 0.03;
 constexpr double kBin_m = 4.0;
-/// A track with a larger variance is searched by itself.
+/// A track with a larger variance is searched separately.
 constexpr double kVague_m2 = 1.0;
-/// More than any scan needs; observations behind these begin tracks.
+/// More than any scan needs; further observations begin tracks.
 constexpr std::size_t kMostCandidates = 65536;
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
@@ -132,13 +132,13 @@ class Matcher {
     }
   }
 
-  /// The scan is nearly as likely with another track for observation `i`, whose own observation
-  /// then takes the track of `i` (or none).
+  /// Whether the scan is nearly as likely with another track for observation `i`, whose own
+  /// observation then takes the track of `i` (or none).
   bool is_ambiguous(std::uint32_t i) const {
     const std::uint32_t own = partner_[i];
     const double now = cost(i, own);
     for (const Candidate& c : by_observation_[i]) {
-      // One observation beside an older track is more likely an outlier or a false detection.
+      // A single observation beside an older track is more likely an outlier or a false detection.
       const bool counts = tracks_[c.track].observations >= 2 || tracks_[own].observations < kYoung;
       if (c.track == own || !counts) continue;
       const std::uint32_t j = owner_[c.track];
@@ -147,7 +147,7 @@ class Matcher {
       if (other < margin_) return true;
     }
 
-    // Another observation, without a track, may be this track's instead.
+    // Another observation without a track may belong to this track instead.
     return std::ranges::any_of(by_track_[own], [&](const Candidate& c) {
       return c.observation != i && partner_[c.observation] == kFree && c.cost - now < margin_;
     });
@@ -159,7 +159,7 @@ class Matcher {
   std::vector<Candidate> all_;
   std::vector<std::uint32_t> partner_;  ///< Track of each observation.
   std::vector<std::uint32_t> owner_;    ///< Observation of each track.
-  double margin_ = 0.0;                 ///< Least difference of costs to be unambiguous.
+  double margin_ = 0.0;                 ///< Least difference of costs for an unambiguous match.
 };
 
 }  // namespace

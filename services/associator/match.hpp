@@ -17,7 +17,7 @@ inline constexpr std::uint32_t kYoung = 4;
 inline constexpr double kReluctance = 8.0;
 
 /// One-to-one pairs inside the gate at the pose `local_T_vehicle`: likeliest first, then improved
-/// by swaps. A trunk and a corner never pair. A pair is ambiguous where another pairing is not
+/// by swaps. A trunk and a corner never pair. A pair is ambiguous if another pairing is less than
 /// `min_likelihood_ratio` times less likely. In order of observation. Cost O(candidates log
 /// candidates); few candidates per observation in any forest.
 std::vector<Match> match(std::span<const Track> tracks, std::span<const Observation> observations,

@@ -8,18 +8,18 @@
 namespace understory::associator {
 namespace {
 
-/// chi^2 of 2 degrees of freedom: one in 100,000.
+/// chi^2 of 2 degrees of freedom: exceeded once in 100,000.
 constexpr double kGate = 23.0;
-/// Contradictions in a row after which a track moves.
+/// Successive contradictions after which a track moves.
 constexpr std::uint32_t kContradictions = 2;
-/// Error of the difference of two observations that their covariances lack, per axis.
+/// Error of the difference of two observations that is missing in their covariances, per axis.
 constexpr double kFloor_m = 0.03;
 
 }  // namespace
 
 void check_motion(Track& track, const Observation& observation, const MotionCheck& check,
                   const AssociatorParameters& parameters) {
-  // Where a stationary track is expected now, and with which covariance.
+  // Expected position of a stationary track, with its covariance.
   const geometry::SE2 now_T_then = check.then_T_now.mean.inverse();
   const Eigen::Vector2d expected = now_T_then * track.reference.position_m;
   Eigen::Matrix<double, 2, 3> by_motion;
@@ -30,7 +30,7 @@ void check_motion(Track& track, const Observation& observation, const MotionChec
                                  by_motion * check.then_T_now.covariance * by_motion.transpose() +
                                  kFloor_m * kFloor_m * Eigen::Matrix2d::Identity();
 
-  // It is not there.
+  // Outside the gate.
   const Eigen::Vector2d off = observation.position_m - expected;
   if (off.dot(spread.inverse() * off) > kGate) {
     if (++track.moved_in_a_row >= kContradictions) track.steadiness = Steadiness::kMoves;
@@ -39,11 +39,11 @@ void check_motion(Track& track, const Observation& observation, const MotionChec
   track.moved_in_a_row = 0;
   if (track.steadiness != Steadiness::kUnknown) return;
 
-  // It is: stationary, if somebody who walks would be outside the gate by now.
+  // Inside: the track is stationary if a pedestrian would be outside the gate by now.
   const double widest = geometry::eigenvalues(spread).maxCoeff();
   const double noticed_m = std::sqrt(kGate * widest);
   const bool is_noticed = parameters.walking_mps * check.seconds > noticed_m;
-  // A longer comparison would not decide it either.
+  // A longer comparison would not decide it, either.
   if (is_noticed || check.seconds > kMaxComparison_s) track.steadiness = Steadiness::kStationary;
 }
 

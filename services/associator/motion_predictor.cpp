@@ -6,15 +6,15 @@
 namespace understory::associator {
 namespace {
 
-/// Odometry is never trusted below this [m^2, rad^2].
+/// Least variance of odometry [m^2, rad^2].
 constexpr double kMotionFloor = 1e-8;
 constexpr double kMaxPoseAge_s = 1.0;
-/// Kept for the comparison of observations (motion_check.hpp).
+/// Odometry kept for the comparison of observations (motion_check.hpp).
 constexpr model::Utime kOdometryKept_us = 2'000'000;
 constexpr model::Utime kGapTolerance_us = 1000;
-/// Acceleration [m/s^2] that a constant velocity may have missed.
+/// Acceleration [m/s^2] allowed for in a motion at constant velocity.
 constexpr double kUnknownAcceleration_mps2 = 3.0;
-/// Interval [s] that `motion_sigma_rad` is for.
+/// Interval [s] of `motion_sigma_rad`.
 constexpr double kNominalInterval_s = 0.1;
 
 double seconds_between(model::Utime from, model::Utime to) {
@@ -101,7 +101,7 @@ std::optional<geometry::SE2WithCovariance> MotionPredictor::by_filter(model::Uti
       Eigen::Vector3d(shift_variance, shift_variance, rotation_variance).asDiagonal()};
 }
 
-/// The last motion repeats, in proportion to time.
+/// Repeats the last motion, in proportion to time.
 geometry::SE2WithCovariance MotionPredictor::extrapolated(model::Utime utime) const {
   const double interval = seconds_between(*last_scan_, utime);
   const double stretch = std::max(1.0, interval / last_interval_s_);
@@ -114,7 +114,7 @@ geometry::SE2WithCovariance MotionPredictor::extrapolated(model::Utime utime) co
 std::optional<geometry::SE2WithCovariance> MotionPredictor::by_wheels(model::Utime from,
                                                                       model::Utime to) const {
   if (odometry_.increments().empty()) return std::nullopt;
-  // Without a gyro the heading rests on the steering, which is not accurate enough.
+  // Without a gyro the heading is from the steering angle, which is not accurate enough.
   const model::Odometry& latest = odometry_.increments().back();
   if (!latest.has_wheels || !latest.inertial) return std::nullopt;
   return odometry_.between(from, to);

@@ -1,4 +1,4 @@
-// How the vehicle has moved since the last scan, as far as anything measures it.
+// Motion of the vehicle since the last scan, from the available measurements.
 #pragma once
 
 #include <optional>
@@ -10,38 +10,38 @@
 
 namespace understory::associator {
 
-/// A message that is so much earlier than the last one means that the clock was set back.
+/// A message earlier than the last one by this time shows that the clock was set back.
 inline constexpr model::Utime kClockJump_us = 10'000'000;
 
 /// A predicted motion between two scans.
 struct PredictedMotion {
   geometry::SE2WithCovariance last_T_now;
-  bool is_extrapolated = false;  ///< Nothing measured it: the last motion repeats.
+  bool is_extrapolated = false;  ///< No measurement: the last motion is repeated.
 };
 
 /// Owns the odometry, the filter's latest pose and the motion between the last two scans.
 class MotionPredictor {
  public:
-  /// Without any measurement the vehicle is taken to stand still.
+  /// Without any measurement the vehicle is assumed to stand still.
   explicit MotionPredictor(const AssociatorParameters& parameters) : parameters_(parameters) {}
 
-  /// Motion by wheels or IMU. One that is not finite is ignored; one that begins 10 s before the
-  /// latest one starts the buffer anew (the clock jumped back).
+  /// Motion by wheels or IMU. An increment that is not finite is ignored; one that begins 10 s
+  /// before the latest one clears the buffer (the clock was set back).
   void add(const model::Odometry& increment);
   /// The filter's pose: its velocity and biases predict the next motion if it belongs to the last
-  /// scan. One that is not finite is ignored.
+  /// scan. A pose that is not finite is ignored.
   void add(const model::EkfPose& pose);
 
-  /// Time of the last scan that was placed; none at the start.
+  /// Time of the last located scan; none at the start.
   const std::optional<model::Utime>& last_scan() const { return last_scan_; }
-  /// The motion from the last scan to `utime`: by wheels; else by whichever of the filter's
-  /// velocity with the IMU and the IMU alone has the smaller covariance; else the last motion
-  /// repeats. Precondition: there is a last scan.
+  /// The motion from the last scan to `utime`: by wheels; else by the filter's velocity with the
+  /// IMU or by the IMU alone, whichever has the smaller covariance; else the last motion is
+  /// repeated. Precondition: there is a last scan.
   PredictedMotion predict(model::Utime utime) const;
-  /// The motion by wheels and gyro alone; nothing where either is missing.
+  /// The motion by wheels and gyro alone; none if either is missing.
   std::optional<geometry::SE2WithCovariance> by_wheels(model::Utime from, model::Utime to) const;
 
-  /// A scan was placed: its time, and the motion since the last one (used if there was one).
+  /// Sets the time of a located scan, and the motion since the last one (used if there was one).
   void set_scan(model::Utime utime, const geometry::SE2& last_T_now);
   /// The next scan is taken as the first one.
   void forget_scan() { last_scan_.reset(); }

@@ -10,9 +10,9 @@
 namespace understory::associator {
 namespace {
 
-/// Least size of a consistent set that is trusted.
+/// Least size of a consistent set.
 constexpr std::size_t kMinConsistent = 3;
-/// Variance of the heading [rad^2] by a consistent set; the refinement finds the true one.
+/// Variance of the heading [rad^2] by a consistent set, before the refinement.
 constexpr double kSearchedHeadingVariance = 0.01;
 
 std::vector<geometry::UncertainPoint> reference_points(std::span<const Track> tracks,
@@ -70,7 +70,7 @@ class ScanLocaliser {
   bool fits(const geometry::Registration& pose) const {
     const geometry::SE2 vehicle_T_local = pose.reference_T_observed.inverse();
     std::size_t in_view = 0;
-    std::size_t confirmed = 0;  // With two observations or more.
+    std::size_t confirmed = 0;  // Tracks with two observations or more.
     for (const Track& track : tracks_) {
       if (track.steadiness == Steadiness::kMoves) continue;
       if (!view_.contains(vehicle_T_local * track.position_m)) continue;
@@ -85,7 +85,7 @@ class ScanLocaliser {
         .is_met(pose.pairs.size(), std::min(observations_.size(), matchable));
   }
 
-  /// The pose by the largest consistent set, refined. Without such a set it is the guess.
+  /// The pose by the largest consistent set, refined; the guess if there is no such set.
   geometry::Registration search(const geometry::SE2WithCovariance& guess) const {
     const auto reference = consistency_points(tracks_);
     const auto observed = consistency_points(observations_);
@@ -129,14 +129,14 @@ Localisation locate(std::span<const Track> tracks, std::span<const Observation> 
                     const AssociatorParameters& parameters) {
   if (parameters.method == "nearest") return {{guess.mean, guess.covariance, {}}};
 
-  // The predicted pose, refined in rounds.
+  // The predicted pose, refined iteratively.
   const ScanLocaliser localiser(tracks, observations, view, parameters);
   geometry::Registration refined = localiser.refine(guess);
   const bool fits = localiser.fits(refined);
   const bool is_enough = parameters.method == "registered" || (parameters.method == "auto" && fits);
   if (is_enough) return {std::move(refined), fits, false};
 
-  // The largest consistent set, where it explains more.
+  // The largest consistent set, if it gives more matches.
   geometry::Registration searched = localiser.search(guess);
   if (fits && searched.pairs.size() <= refined.pairs.size())
     return {std::move(refined), fits, true};

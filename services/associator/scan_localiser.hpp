@@ -1,4 +1,4 @@
-// Where the vehicle was at a scan, relative to the tracks.
+// Pose of the vehicle at a scan, relative to the tracks.
 #pragma once
 
 #include <span>
@@ -13,14 +13,14 @@ namespace understory::associator {
 
 /// Result of the localisation of one scan.
 struct Localisation {
-  geometry::Registration pose;  ///< local_T_vehicle, with the pairs (per kind) that it rests on.
-  bool fits = true;             ///< Enough of what can be matched was matched.
+  geometry::Registration pose;  ///< local_T_vehicle, with the pairs (per kind) used for it.
+  bool fits = true;             ///< Enough of the possible matches were found.
   bool was_searched = false;    ///< The largest consistent set was searched.
 };
 
-/// Locates a scan from the predicted pose `guess` (local_T_vehicle) by the method that the
-/// parameters name. Tracks that move take part in the search alone. With the method "nearest" the
-/// guess is the result and always fits; so does a scan without observations.
+/// Locates a scan from the predicted pose `guess` (local_T_vehicle) by the configured method.
+/// Moving tracks are used only in the search. With the method "nearest" the guess is the result and
+/// always fits; so does a scan without observations.
 Localisation locate(std::span<const Track> tracks, std::span<const Observation> observations,
                     const model::FieldOfView& view, const geometry::SE2WithCovariance& guess,
                     const AssociatorParameters& parameters);

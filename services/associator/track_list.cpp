@@ -8,12 +8,12 @@
 namespace understory::associator {
 namespace {
 
-/// Observations after which a track's mean starts to forget, so that the drift of `local` does not
-/// smear it.
+/// Largest weight of a track's mean [observations]: older ones fade, so that the drift of `local`
+/// does not blur it.
 constexpr double kMaxWeight = 24.0;
-/// Margin for the edge of the field of view, which is not sharp.
+/// Margin for the blurred edge of the field of view.
 constexpr double kEdge_m = 1.0;
-/// So many stationary tracks determine the vehicle's motion whatever others do.
+/// This number of stationary tracks determines the vehicle's motion, whatever the other tracks do.
 constexpr std::size_t kEnoughStationary = 3;
 
 /// The scans that decide whether a track is consistent, as a mask of Track::history.
@@ -59,7 +59,8 @@ std::vector<model::TrackId> TrackList::update(std::span<const Observation> obser
   for (const Match& match : matches) matched[match.track] = used[match.observation] = 1;
   age(matched, local_T_vehicle.inverse(), view);
 
-  // Matched tracks. An ambiguous match teaches nothing: it is not certain whose position it is.
+  // Matched tracks. An ambiguous match does not update its track: the observation may be of another
+  // one.
   for (const Match& match : matches) {
     if (match.ambiguous) continue;
     Track& track = tracks_[match.track];
@@ -120,15 +121,15 @@ Track& TrackList::begin(const Observation& observation, const geometry::SE2& loc
   return track;
 }
 
-/// Where hardly any stationary track is in view, the vehicle's motion would follow one that walks.
+/// With very few stationary tracks in view, the vehicle's motion would follow a moving one.
 bool TrackList::is_steady(const Track& track) const {
   if (parameters_.walking_mps <= 0.0) return true;
   return track.steadiness == Steadiness::kStationary ||
          (track.steadiness == Steadiness::kUnknown && !requires_proof_);
 }
 
-/// A young track within the noise of a consistent one that was not matched itself: the observation
-/// is probably an outlier of the consistent one.
+/// Whether a young track lies within the noise of a consistent one that was not matched: then the
+/// observation is probably an outlier of the consistent one.
 bool TrackList::stands_in(const Track& track, std::span<const std::uint8_t> matched) const {
   for (std::size_t i = 0; i < matched.size(); ++i) {
     const Track& other = tracks_[i];
@@ -147,7 +148,7 @@ void TrackList::confirm(Track& track) {
   if (std::popcount(recent) >= parameters_.confirm_matches) track.id = next_id_++;
 }
 
-/// Beyond kMostTracks the oldest go that the scan did not match.
+/// Beyond kMostTracks the oldest unmatched tracks are removed.
 void TrackList::drop_excess(std::span<const std::uint8_t> matched) {
   if (tracks_.size() <= kMostTracks) return;
   std::size_t excess = tracks_.size() - kMostTracks;

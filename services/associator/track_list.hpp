@@ -1,5 +1,4 @@
-// The landmarks around the vehicle that are followed from scan to scan, in a frame that drifts
-// slowly.
+// Tracks of landmarks around the vehicle from scan to scan, in a frame that drifts slowly.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +22,7 @@ enum class Steadiness : std::uint8_t {
   kMoves = 2,
 };
 
-/// The observation of a track that later ones are compared with.
+/// A track's observation for comparison with later ones.
 struct ReferenceObservation {
   model::Utime utime = 0;
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();     ///< Frame `vehicle_level` at utime.
@@ -36,21 +35,22 @@ struct ReferenceObservation {
   }
 };
 
-/// One landmark that is followed.
+/// A tracked landmark.
 struct Track {
   model::TrackId id = 0;                                 ///< 0 = not consistent yet.
-  std::uint64_t number = 0;                              ///< From its beginning; never used again.
+  std::uint64_t number = 0;                              ///< Unique for each track; never reused.
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `local`.
   double detection_variance_m2 = 0.0;                    ///< Mean over its detections, per axis.
   double radius_m = 0.0;                                 ///< Mean; 0 where unknown.
   std::uint32_t observations = 0;                        ///< Matched without ambiguity.
   std::uint64_t history = 0;  ///< Bit k: matched k scans ago, of the scans that had it in view.
   std::uint32_t age = 0;      ///< Number of scans that had it in view.
-  std::uint32_t missed = 0;   ///< Scans in a row that had it in view and did not match it.
+  std::uint32_t missed = 0;   ///< Successive scans that had it in view and did not match it.
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
   Steadiness steadiness = Steadiness::kUnknown;
-  std::uint32_t moved_in_a_row = 0;  ///< Observations in a row that contradict a stationary track.
-  ReferenceObservation reference;    ///< The first one, later one of the last 1.5 s.
+  std::uint32_t moved_in_a_row =
+      0;                           ///< Successive observations that contradict a stationary track.
+  ReferenceObservation reference;  ///< The first one; later, one of the last 1.5 s.
 
   /// Isotropic variance of the position, per axis.
   double variance_m2() const;
@@ -64,23 +64,23 @@ struct Track {
   }
 };
 
-/// An observation and the track that it is taken for, as indices.
+/// An observation and the track paired with it, as indices.
 struct Match {
   std::uint32_t observation = 0;
   std::uint32_t track = 0;
-  bool ambiguous = false;  ///< Another pairing explains the scan nearly as well.
+  bool ambiguous = false;  ///< Another pairing is nearly as likely for the scan.
 };
 
-/// The vehicle's motion (then_T_now) by wheels and IMU from a time until now; nothing where it was
-/// not measured.
+/// The vehicle's motion (then_T_now) by wheels and IMU from a time until now; none if it was not
+/// measured.
 using MotionSince =
     std::function<std::optional<geometry::SE2WithCovariance>(model::Utime then_utime)>;
 
-/// Owns the tracks and their life: begin, confirmation, end. Bounded by the range of the sensor,
-/// and by kMostTracks.
+/// Owns the tracks: begins, confirms and ends them. Bounded by the range of the sensor, and by
+/// kMostTracks.
 class TrackList {
  public:
-  /// More than any scene has, with scans of 2,000 false detections each.
+  /// More than any scene has, even with 2,000 false detections per scan.
   static constexpr std::size_t kMostTracks = 4096;
 
   /// No tracks; the first id is 1.
@@ -92,15 +92,15 @@ class TrackList {
   model::TrackId next_id() const { return next_id_; }
   /// The number of the next track that begins.
   std::uint64_t next_number() const { return next_number_; }
-  /// Ends all tracks. Ids go on.
+  /// Ends all tracks. Ids continue.
   void clear() { tracks_.clear(); }
 
-  /// Decides for each matched track whether it moves. To be called before update() of the same
-  /// scan, where the check is on (`walking_mps` > 0).
+  /// Decides for each matched track whether it moves. Call it before update() of the same scan if
+  /// the check is on (`walking_mps` > 0).
   void check_steadiness(std::span<const Observation> observations, std::span<const Match> matches,
                         model::Utime utime, const MotionSince& motion_since);
 
-  /// Takes a scan's matches from the pose `local_T_vehicle`. Observations without a match begin
+  /// Applies a scan's matches from the pose `local_T_vehicle`. Observations without a match begin
   /// tracks; tracks that were in view too often without a match end. Returns the track id to
   /// publish for each observation, 0 = none. Cost O(tracks^2) in the worst case.
   std::vector<model::TrackId> update(std::span<const Observation> observations,

@@ -13,10 +13,10 @@ namespace understory::existence_tracker {
 namespace {
 
 constexpr state::Format kServiceFormat{"existence_tracker_service", 1};
-/// Message time from one question for the whole map to the next.
+/// Message time between requests for the whole map.
 constexpr model::Utime kAskAgain_us = 5'000'000;
 
-/// The map that the drive begins with; as the mapper's.
+/// The map at the start of the drive; the same as the mapper's.
 struct InputParameters {
   std::string map_file;
   int map_id = 0;
@@ -134,8 +134,8 @@ class TrackerAdapter : public bus::Adapter {
                                  "MAP_DELTA", bus::Condition(limits_)};
   bus::Node* node_ = nullptr;
   std::unique_ptr<ExistenceTracker> stage_;
-  bool is_mapping_needed_ = false;  ///< As it was logged last.
-  model::Utime asked_ = -1;         ///< When the whole map was asked for.
+  bool is_mapping_needed_ = false;  ///< As last logged.
+  model::Utime asked_ = -1;         ///< Time of the last request for the whole map.
   bus::Publisher<model::Existence> existence_;
   bus::Publisher<model::ExistenceState> states_;
   bus::Publisher<map_request_t> requests_;

@@ -1,4 +1,4 @@
-// The existence tracker on the bus.
+// Connects the existence tracker to the bus.
 #pragma once
 
 #include <string>
@@ -20,8 +20,8 @@ struct TrackerChannels {
   std::string map_request = all.out("MAP_REQUEST", "asks for MAP where landmarks are not known");
 };
 
-/// The process: its name, its channels and how to make its adapter. The stage is made when the
-/// service is bound, by the parameters that are then in force.
+/// The service: its name, its channels and the factory of its adapter. The stage is made when the
+/// service is bound, with the parameters of that time.
 bus::Service existence_tracker_service(const TrackerChannels& channels = {});
 
 }  // namespace understory::existence_tracker

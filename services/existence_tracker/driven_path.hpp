@@ -1,4 +1,4 @@
-// The path that the vehicle has driven since the tracker began.
+// Path of the vehicle since the tracker began.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,11 +9,11 @@
 
 namespace understory::existence_tracker {
 
-/// Path by the keyframes' places, and the pass that is open: a pass is a way
-/// through a place, and after so much path the next one begins.
+/// Path length from the keyframes' positions, and the current pass: a pass is a way through a
+/// place; after a given path length the next one begins.
 class DrivenPath {
  public:
-  /// The next keyframe's place, frame map.
+  /// The next keyframe's position, frame map.
   void drive_to(const Eigen::Vector2d& place_m) {
     if (place_m_) along_m_ += std::min(kLongestStep_m, (place_m - *place_m_).norm());
     place_m_ = place_m;
@@ -23,7 +23,7 @@ class DrivenPath {
 
   /// Path so far [m].
   double along_m() const { return along_m_; }
-  /// Path of the pass that is open [m].
+  /// Path of the current pass [m].
   double of_pass_m() const { return along_m_ - pass_began_m_; }
   /// Of the last keyframe, frame map; the origin before the first.
   Eigen::Vector2d place_m() const { return place_m_.value_or(Eigen::Vector2d::Zero()); }
@@ -35,8 +35,7 @@ class DrivenPath {
   }
 
  private:
-  /// A step that no vehicle drives between two keyframes is a correction of the
-  /// map.
+  /// A longer step between two keyframes is a correction of the map.
   static constexpr double kLongestStep_m = 50.0;
 
   std::optional<Eigen::Vector2d> place_m_;

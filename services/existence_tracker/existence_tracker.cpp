@@ -10,7 +10,7 @@ namespace understory::existence_tracker {
 namespace {
 
 constexpr std::size_t kStatesPerMessage = 200;
-/// Looks from nearer or farther are none: the map is wrong there [m].
+/// A look from a smaller or larger distance is ignored: the map is wrong there [m].
 constexpr float kNearestM = 0.05F;
 constexpr float kFarthestM = 1e4F;
 
@@ -64,9 +64,9 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
   news_.begin_anew();
   use_.begin_anew();
   for (auto& [id, tracked] : points) {
-    lessons.restore(id, tracked, false);  // What P of each follows is its own.
+    lessons.restore(id, tracked, false);  // P of each follows its own estimate.
     use_.add(tracked);
-    // Who holds the map does not know yet which are not in use.
+    // Subscribers do not know yet which ones are out of use.
     if (!tracked.is_in_use) news_.touch(id);
   }
   lessons_ = std::move(lessons);
@@ -100,8 +100,7 @@ std::optional<model::Existence> ExistenceTracker::on_update(const model::MapUpda
   drive_to(update);
   forget(update);
 
-  // What was seen, and what was not. New landmarks wait until it is known where
-  // they are.
+  // Seen and missed landmarks. New landmarks wait until their position is known.
   const Eigen::Vector2d vehicle_m = update.map_T_vehicle.translation();
   std::vector<model::LandmarkId> added = update.added;
   std::ranges::sort(added);
@@ -165,12 +164,12 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   use_.decide(tracked, may_be_used(tracked));
   news_.touch(id);
 
-  // What is known to be gone, or was hidden, is not missing.
+  // A landmark that is out of use, or was occluded, is not missing.
   if (is_hit || (was_in_use && ray != existence::Ray::kBlocked))
     count_need(id, tracked, is_hit, before);
 }
 
-/// `before`: P before the look. What is not used yet is not new.
+/// `before`: P before the look. A landmark that is not used yet is not new.
 void ExistenceTracker::count_need(model::LandmarkId id, const TrackedPoint& tracked, bool is_hit,
                                   double before) {
   const bool is_new =
@@ -183,10 +182,10 @@ void ExistenceTracker::count_need(model::LandmarkId id, const TrackedPoint& trac
   }
 }
 
-/// Whether the landmark's pass goes on: one in view where the vehicle's pass
-/// ends is not looked at in two of them, nor is one that a drive comes back to:
-/// lanes side by side see it or miss it for one reason, and say nothing of how
-/// often another drive does.
+/// Whether the landmark's pass continues. A landmark in view when the vehicle's pass ends belongs
+/// to one of the two passes only. A return within the same drive continues the pass, too:
+/// neighbouring lanes see or miss a landmark for the same reason, and do not show how often another
+/// drive does.
 bool ExistenceTracker::goes_on(TrackedPoint& tracked, model::Utime utime) const {
   const LookParameters& looks = parameters_.looks;
   const bool is_in_view = path_.along_m() - tracked.looked_m < looks.same_pass_m &&
@@ -200,7 +199,7 @@ bool ExistenceTracker::goes_on(TrackedPoint& tracked, model::Utime utime) const 
   return false;
 }
 
-/// The landmark's point; of a given map it is new here.
+/// The landmark's point; one of a given map gets a new point.
 TrackedPoint& ExistenceTracker::known(model::LandmarkId id, model::Utime utime) {
   const auto [found, is_new] =
       points_.try_emplace(id, TrackedPoint{Point::known(lessons_.model()), utime});
@@ -212,14 +211,13 @@ TrackedPoint& ExistenceTracker::known(model::LandmarkId id, model::Utime utime) 
   return found->second;
 }
 
-/// A point that is new here.
+/// Adds a new point.
 void ExistenceTracker::begin(model::LandmarkId id, TrackedPoint& tracked) {
   lessons_.begin(id, tracked);
   news_.begin(id);
 }
 
-/// Landmarks whose first sighting is some keyframes old get their probability
-/// now.
+/// Landmarks whose first sighting is some keyframes old get their probability now.
 void ExistenceTracker::give_birth() {
   std::erase_if(births_, [&](const Birth& birth) {
     const auto place_m = places_.at(birth.id);
@@ -255,10 +253,10 @@ void ExistenceTracker::forget(const model::MapUpdate& update) {
   for (const auto& [old_id, new_id] : update.merged) merge(old_id, new_id);
 }
 
-/// Two names of one thing: what speaks for it counts.
+/// Two ids of one landmark: evidence for it is kept.
 void ExistenceTracker::merge(model::LandmarkId old_id, model::LandmarkId new_id) {
   const auto before = points_.find(old_id);
-  if (before == points_.end()) return erase(old_id);  // It was not born yet.
+  if (before == points_.end()) return erase(old_id);  // It had no point yet.
   judge(old_id, before->second);
   const auto after = points_.find(new_id);
   if (after == points_.end()) {
@@ -285,7 +283,7 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
   existence.map_id = update.map_id;
   existence.known = static_cast<std::uint32_t>(points_.size());
   existence.unused = use_.unused();
-  // Beyond what drives have missed, not what this one misses.
+  // Beyond the misses of earlier drives; this drive's misses are excluded.
   const existence::ExistenceModel& model = lessons_.model();
   const double usual = model.learned().before;
   const double recall = usual > 0.0 ? usual : model.recall().of_pass();
@@ -305,9 +303,8 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
   return existence;
 }
 
-/// What this keyframe added is told at once, before it is known where it is:
-/// else it would be in use until the next keyframe, and after a drive's last
-/// one until the next drive.
+/// Publishes landmarks that this keyframe added at once, before their position is known: else they
+/// would be in use until the next keyframe, and after the last one of a drive until the next drive.
 void ExistenceTracker::tell_new(model::Utime utime, model::Existence& existence) const {
   for (const Birth& birth : births_)
     if (birth.utime == utime && !points_.contains(birth.id))

@@ -1,5 +1,4 @@
-// The existence tracker without its process: which landmarks of the map are
-// still there.
+// The existence tracker without its process: which landmarks of the map still exist.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +23,9 @@ namespace understory::existence_tracker {
 struct LookCounters {
   std::uint64_t hits = 0;
   std::uint64_t misses = 0;
-  std::uint64_t blocked = 0;        ///< Of the misses: hidden behind something.
-  std::uint64_t clear = 0;          ///< Of the misses: the beams went on behind the place.
-  std::uint64_t without_place = 0;  ///< Looks at landmarks of which no message said where they are.
+  std::uint64_t blocked = 0;        ///< Misses: the landmark was occluded.
+  std::uint64_t clear = 0;          ///< Misses: the beams passed behind its position.
+  std::uint64_t without_place = 0;  ///< Looks at landmarks of unknown position.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -35,67 +34,59 @@ struct LookCounters {
   }
 };
 
-/// What the tracker has done so far.
+/// Counts since the tracker began.
 struct TrackerCounters : LookCounters {
   std::uint64_t dropped = 0;     ///< Landmarks taken out of use ...
   std::uint64_t readmitted = 0;  ///< ... and into use again.
 };
 
-/// Follows the mapper: each keyframe says which landmarks it saw, and which it
-/// should have seen and did not, with what the sensor measured along the ray.
-/// What was hidden says nothing of the landmark; what was in clear view and not
-/// seen says more than a mere miss. For every landmark it keeps the probability
-/// that it exists, and the shell from which it can be seen (common/existence;
-/// thesis 003). A landmark that is improbable is not to be used; it is kept and
-/// looked for, and in use again when it is seen. It never associates by itself.
+/// Follows the mapper: each keyframe lists the landmarks that it saw and those that it expected but
+/// did not see, with the sensor's measurement along the ray. An occluded landmark is no evidence; a
+/// landmark missing in clear view is stronger evidence than a mere miss. For every landmark it
+/// keeps the probability of existence, and the shell from which it is visible (common/existence;
+/// thesis 003). An improbable landmark is out of use; it is kept and looked for, and is in use
+/// again when it is seen. The tracker makes no associations itself.
 ///
-/// What all landmarks have taught is summed up every 100 m of path, from counts
-/// that follow what changed. P of a landmark follows where it is near, looked
-/// at or told.
+/// Statistics of all landmarks are evaluated every 100 m of path, from counts that are updated
+/// incrementally. P of a landmark is updated when it is near, looked at or published.
 ///
-/// Memory: some 300 bytes per landmark. Time: what a keyframe looks at and,
-/// every 100 m, what is around; all landmarks where a drive begins.
+/// Memory: some 300 bytes per landmark. Time: the landmarks that a keyframe looks at and, every
+/// 100 m, those around; all landmarks at the start of a drive.
 class ExistenceTracker {
  public:
-  /// Without landmarks. Throws std::invalid_argument where a parameter of the
-  /// model cannot be.
+  /// Without landmarks. Throws std::invalid_argument on invalid parameters of the model.
   explicit ExistenceTracker(const TrackerParameters& parameters = {});
 
-  /// Goes on with landmarks of an earlier drive; a new pass begins. Throws
-  /// std::invalid_argument where a state is none of this version: nothing is
-  /// changed then.
+  /// Continues with landmarks of an earlier drive; a new pass begins. Throws std::invalid_argument,
+  /// without change, if a state is not of this version.
   void begin_with(std::span<const model::ExistenceState> states);
 
-  /// MAP, MAP_DELTA: where the landmarks are. New ones get their probability
-  /// now.
+  /// MAP, MAP_DELTA: positions of the landmarks. New ones get their probability now.
   void on_map(const model::WholeMap& map);
   void on_delta(const model::MapDelta& delta);
 
-  /// SLAM_UPDATE. None where the keyframe has no place.
+  /// SLAM_UPDATE. None if the keyframe was not localised.
   std::optional<model::Existence> on_update(const model::MapUpdate& update);
 
-  /// What has changed since it was told last, up to 200 landmarks each: for a
-  /// store.
+  /// States that have changed since the last call, up to 200 landmarks each: for a store.
   std::vector<model::ExistenceState> take_states();
 
-  /// The probability of a landmark that is known.
+  /// The probability of a landmark; none if it is unknown.
   std::optional<model::LandmarkExistence> of(model::LandmarkId id) const;
-  /// What was done so far.
+  /// Counts so far.
   TrackerCounters counters() const { return {looks_, use_.dropped(), use_.readmitted()}; }
-  /// What became of the landmarks, as it is counted now and counted anew: the
-  /// same.
+  /// Histories of the landmarks by passes; the incremental count equals a new count.
   existence::PassHistories histories() const { return lessons_.histories(points_); }
   existence::PassHistories recount() const;
-  /// Landmarks are looked at of which no message said where they are: the whole
-  /// map is wanted.
+  /// Whether landmarks of unknown position are looked at: then the whole map is needed.
   bool wants_map() const { return wants_map_; }
 
-  /// The state as bytes; load() goes on with it. Throws std::invalid_argument.
+  /// The state as bytes; load() continues with it. Throws std::invalid_argument.
   std::string save() const;
   void load(const std::string& state);
 
  private:
-  /// A landmark that was added, before it is known where.
+  /// A new landmark whose position is not known yet.
   struct Birth {
     model::LandmarkId id = 0;
     Eigen::Vector2d vehicle_m = Eigen::Vector2d::Zero();  ///< Frame map.
@@ -110,7 +101,7 @@ class ExistenceTracker {
   struct LastKeyframe {
     model::Utime utime = 0;
     std::uint32_t map_id = 1;
-    bool begins_drive = false;  ///< The next one is the first one with these landmarks.
+    bool begins_drive = false;  ///< The next keyframe is the first one with these landmarks.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {

@@ -1,20 +1,18 @@
-// What the landmarks teach of detector and world, and what that says of each of
-// them.
+// Statistics of the landmarks, and their effect on each landmark.
 #include "services/existence_tracker/existence_tracker.hpp"
 
 namespace understory::existence_tracker {
 namespace {
 
-/// Path after which what all landmarks teach is summed up [m].
+/// Path length between evaluations of the statistics [m].
 constexpr double kLearnedEveryM = 100.0;
 
 }  // namespace
 
-/// The time since the landmarks were looked at has passed for all of them.
-/// O(landmarks).
+/// The time since the last looks has passed for all landmarks. O(landmarks).
 void ExistenceTracker::begin_drive(model::Utime utime) {
   lessons_.learn(points_,
-                 path_.along_m());  // What the end of the drive before taught.
+                 path_.along_m());  // From the end of the drive before.
   for (auto& [id, tracked] : points_) {
     judge(id, tracked);
     lessons_.count_false(tracked, parameters_.use.drop_below);
@@ -33,8 +31,8 @@ void ExistenceTracker::begin_drive(model::Utime utime) {
   path_.begin_pass();
 }
 
-/// P anew by what was learned since it was last judged. What a drive missed
-/// that misses more than others never left.
+/// Updates P with the estimates since its last update. Landmarks missed by a drive that misses more
+/// than usual are put back into use.
 void ExistenceTracker::judge(model::LandmarkId id, TrackedPoint& tracked) {
   if (!lessons_.judge(id, tracked)) return;
   use_.take_back(tracked, may_be_used(tracked));
@@ -48,8 +46,8 @@ void ExistenceTracker::learn_on_the_way() {
   judge_around();
 }
 
-/// Landmarks that may come into view before the next sum: who places by them
-/// knows before.
+/// Landmarks that may come into view before the next evaluation: so their state is published before
+/// they are used for localisation.
 void ExistenceTracker::judge_around() {
   const double radius_m = kLearnedEveryM + parameters_.model.range_m;
   for (const model::LandmarkId id : places_.near(path_.place_m(), radius_m))

@@ -8,7 +8,7 @@ namespace {
 
 /// Side of a cell [m].
 constexpr double kCellM = 50.0;
-/// What is farther from the map's origin is in the last cell: a number that is none does no harm.
+/// Positions farther from the map's origin are in the last cell; NaN is in cell 0.
 constexpr double kLastCell = 1e9;
 
 int cell_along(double metres) {

@@ -1,4 +1,4 @@
-// Where the landmarks of the map are.
+// Positions of the landmarks of the map.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,18 +13,18 @@
 
 namespace understory::existence_tracker {
 
-/// Positions by id, frame `map`, by MAP and MAP_DELTA. Landmarks that the mapper handed over to the
-/// store stay as they were.
+/// Positions by id, frame `map`, from MAP and MAP_DELTA. Landmarks that the mapper handed over to
+/// the store keep their position.
 class LandmarkPlaces {
  public:
-  /// Those of a map: what is known beside them stays.
+  /// Adds the landmarks of a map; others stay.
   void take(const model::WholeMap& map);
-  /// What changed. O(changes).
+  /// Applies a change. O(changes).
   void take(const model::MapDelta& delta);
 
-  /// Where a landmark is [m]; none where no message said so.
+  /// Position of a landmark [m]; none if no message gave it.
   std::optional<Eigen::Vector2d> at(model::LandmarkId id) const;
-  /// Those up to so far from a place, by their ids. O(landmarks around).
+  /// Ids of the landmarks within `radius_m` of a position. O(landmarks around).
   std::vector<model::LandmarkId> near(const Eigen::Vector2d& place_m, double radius_m) const;
   /// Number of landmarks.
   std::size_t size() const { return places_m_.size(); }

@@ -5,7 +5,7 @@
 namespace understory::existence_tracker {
 namespace {
 
-/// Share of what is new that must have been real for it to be used at once.
+/// Least share of real ones among new landmarks for using new ones at once.
 constexpr double kMostAreReal = 0.5;
 
 }  // namespace

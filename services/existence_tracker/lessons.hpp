@@ -1,5 +1,4 @@
-// What all landmarks together teach of detector and world, and what that says
-// of each of them.
+// Statistics of all landmarks about detector and world, and their effect on each landmark.
 #pragma once
 
 #include <cstdint>
@@ -15,64 +14,59 @@ namespace understory::existence_tracker {
 /// The landmarks that are tracked, by their ids.
 using PointsById = std::map<model::LandmarkId, TrackedPoint>;
 
-/// Keeps what became of the landmarks as counts that follow what changes, and
-/// sums them up: how often a pass misses what is there, how much goes, and how
-/// much of what is new is real.
+/// Keeps counts of the landmarks' histories, updated incrementally, and estimates from them: the
+/// share of existing landmarks that a pass misses, the rate of disappearance, and the share of new
+/// landmarks that are real.
 class Lessons {
  public:
-  /// Nothing is learned. Throws std::invalid_argument where a parameter of the
-  /// model cannot be.
+  /// No statistics yet. Throws std::invalid_argument on invalid parameters of the model.
   explicit Lessons(const existence::Parameters& parameters)
       : expected_birth_(parameters.birth), model_(parameters) {}
 
-  /// The model by which every landmark is judged.
+  /// The model for all landmarks.
   existence::ExistenceModel& model() { return model_; }
   const existence::ExistenceModel& model() const { return model_; }
-  /// Path at the last sum [m].
+  /// Path at the last estimate [m].
   double learned_m() const { return learned_m_; }
 
-  /// A point that is new here: it follows what is known.
+  /// A new landmark: its point starts with the present estimates.
   void begin(model::LandmarkId id, TrackedPoint& tracked);
   /// Before a landmark's point changes.
   void change(model::LandmarkId id, TrackedPoint& tracked);
   /// Before a landmark is erased.
   void forget(const TrackedPoint& tracked);
-  /// Sums up. `along_m`: path so far. O(what changed, histories that differ).
+  /// Updates the estimates. `along_m`: path so far. O(changed landmarks, distinct histories).
   void learn(PointsById& points, double along_m);
-  /// P anew by what was learned since it was last judged; false where nothing
-  /// was.
+  /// Updates P with the estimates since its last update; false if there are none.
   bool judge(model::LandmarkId id, TrackedPoint& tracked);
-  /// Whether the point follows the last sum.
+  /// Whether the point is up to date with the last estimate.
   bool is_judged(const TrackedPoint& tracked) const {
     return tracked.judged_times == learned_times_;
   }
 
-  /// Counts a landmark that is seen by another pass than the one that found it.
+  /// Counts a landmark that a later pass than its first one saw.
   void confirm(TrackedPoint& tracked);
-  /// Counts a landmark that another pass, which is over, looked for, and that
-  /// is below `improbable` now. In its first pass nothing counts: nothing can
-  /// be confirmed there either.
+  /// Counts a landmark as false if a later pass, now finished, looked for it and its P is below
+  /// `improbable`. In its first pass nothing is counted, as nothing can be confirmed then, either.
   void count_false(TrackedPoint& tracked, double improbable);
-  /// While most of what is new turns out to be false, it is not used before
-  /// another pass saw it.
+  /// While most new landmarks turn out to be false, they are not used before a later pass sees
+  /// them.
   bool are_new_ones_used() const;
 
-  /// What became of these landmarks, as it is counted now.
+  /// Histories of these landmarks as counted now.
   existence::PassHistories histories(const PointsById& points) const;
 
-  /// What was learned, for the next drive or process.
+  /// The estimates, for the next drive or process.
   std::string encoded() const { return encode(model_, births_); }
-  /// Goes on with what encoded() gave. Throws std::invalid_argument; nothing is
-  /// changed then.
+  /// Continues with the output of encoded(). Throws std::invalid_argument without change.
   void take(std::string_view bytes) { decode(bytes, model_, births_); }
-  /// Other landmarks from now on, of which none is counted yet: restore() each.
+  /// Starts with other landmarks, none counted yet: call restore() for each.
   void begin_anew();
-  /// A landmark with a history. `is_judged`: P follows the last sum.
+  /// Adds a landmark with a history. `is_judged`: P is up to date with the last estimate.
   void restore(model::LandmarkId id, TrackedPoint& tracked, bool is_judged);
 
-  /// Members of a saved state; see common/state. What was learned is in
-  /// encoded(), the histories follow from the landmarks: restore() each after a
-  /// load.
+  /// Members of a saved state; see common/state. The estimates are in encoded(), the histories
+  /// follow from the landmarks: call restore() for each after a load.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.learned_m_);
@@ -82,8 +76,8 @@ class Lessons {
   double expected_birth_;
   existence::ExistenceModel model_;
   BirthCounts births_;
-  existence::PassHistories histories_;      ///< Of all landmarks but those that changed since:
-  std::vector<model::LandmarkId> changed_;  ///< since the last sum, and perhaps gone.
+  existence::PassHistories histories_;      ///< Of all landmarks except changed_.
+  std::vector<model::LandmarkId> changed_;  ///< Since the last estimate; perhaps erased.
   std::uint64_t learned_times_ = 0;
   double learned_m_ = 0.0;
 };

@@ -1,4 +1,4 @@
-// The existence tracker as a process. Its channels: TrackerChannels in adapter.hpp, and --help.
+// The existence tracker's process. Its channels: TrackerChannels in adapter.hpp, and --help.
 #include "services/existence_tracker/adapter.hpp"
 
 int main(int argc, char** argv) {

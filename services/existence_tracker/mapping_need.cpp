@@ -5,7 +5,7 @@
 namespace understory::existence_tracker {
 namespace {
 
-/// A landmark was looked for when so many keyframes expected it.
+/// A landmark counts as looked for when this number of keyframes expected it.
 constexpr int kLooks = 3;
 
 }  // namespace

@@ -19,7 +19,7 @@ std::set<model::LandmarkId> News::take_ids(const PointsById& points) {
   std::set<model::LandmarkId> ids;
   for (const model::LandmarkId id : std::exchange(touched_, {})) {
     const auto found = points.find(id);
-    if (found == points.end()) continue;  // Born since the last keyframe, and merged by this one.
+    if (found == points.end()) continue;  // Added since the last keyframe, and merged by this one.
     const TrackedPoint& tracked = found->second;
     const double change = std::abs(tracked.point.probability() - tracked.told_probability);
     if (change > parameters_.told_change || tracked.is_in_use != tracked.was_told_in_use)

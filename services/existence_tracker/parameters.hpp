@@ -1,15 +1,15 @@
-// Parameters of the existence tracker. What each one does, with range and default, is documented
-// once: in adapter_parameters.cpp, which `understory-existence-tracker --help` prints. Here stand
-// the units that a name does not give.
+// Parameters of the existence tracker. Meaning, range and default of each are documented once: in
+// adapter_parameters.cpp, which `understory-existence-tracker --help` prints. The comments here
+// give units that are not in the name.
 #pragma once
 
 #include "common/existence/parameters.hpp"
 
 namespace understory::existence_tracker {
 
-/// The model's parameters for landmarks of maps that are driven in again: a rate at which things go
-/// (half of them in a year) that is soon learned. With none, what was once seen well exists for
-/// ever.
+/// The model's parameters for maps that are used for years: an initial rate of disappearance (half
+/// of the landmarks in a year), soon replaced by the estimate. With a rate of zero, a landmark once
+/// seen well would exist for ever.
 constexpr existence::Parameters for_maps() {
   existence::Parameters parameters;
   parameters.decay_per_s = 2e-8;
@@ -17,13 +17,13 @@ constexpr existence::Parameters for_maps() {
   return parameters;
 }
 
-/// When a landmark is not used any more, and when it is again.
+/// When a landmark leaves use, and when it returns.
 struct UseParameters {
   double drop_below = 0.1;     ///< Probability.
   double readmit_above = 0.5;  ///< Probability.
 };
 
-/// What is one pass, and which looks count.
+/// Limits of a pass, and which looks count.
 struct LookParameters {
   double pass_s = 14400.0;
   double pass_m = 500.0;      ///< Path.
@@ -32,14 +32,14 @@ struct LookParameters {
   bool use_ranges = true;
 };
 
-/// When the map does not tell any more where the vehicle is.
+/// When the map is no longer sufficient for localisation.
 struct NeedParameters {
   double window_m = 60.0;  ///< Path.
   int min_landmarks = 10;
   double changed_above = 0.3;  ///< Sum of two shares.
 };
 
-/// What is told, and how often.
+/// What is published, and how often.
 struct OutputParameters {
   double told_change = 0.02;  ///< Probability.
   int repeated = 20;          ///< Landmarks per message.

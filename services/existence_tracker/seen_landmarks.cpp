@@ -12,7 +12,7 @@ std::vector<model::LandmarkId> seen_landmarks(const model::MapUpdate& update) {
   std::set<model::LandmarkId> known;
   for (const model::Association& pair : update.associations) {
     model::LandmarkId id = pair.landmark_id;
-    std::size_t steps = 0;  // Bounded: a message may name a ring.
+    std::size_t steps = 0;  // Bounded: merges in a message may form a circle.
     for (auto next = merged.find(id); next != merged.end() && steps <= merged.size();
          next = merged.find(id), ++steps)
       id = next->second;

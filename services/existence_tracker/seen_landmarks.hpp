@@ -1,4 +1,4 @@
-// What a keyframe saw of the map.
+// Landmarks of the map that a keyframe saw.
 #pragma once
 
 #include <vector>
@@ -7,8 +7,8 @@
 
 namespace understory::existence_tracker {
 
-/// The landmarks that a keyframe was matched to, each once; of those that it merged the one that
-/// lives on. O(associations log merges).
+/// The landmarks matched by a keyframe, each once; merged ones by the id that remains.
+/// O(associations log merges).
 std::vector<model::LandmarkId> seen_landmarks(const model::MapUpdate& update);
 
 }  // namespace understory::existence_tracker

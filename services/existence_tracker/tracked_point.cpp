@@ -9,7 +9,7 @@ namespace {
 
 using Saved = existence::SavedPoint<existence::IcosahedralShell>;
 
-/// Throws where bytes are left over.
+/// Throws if bytes are left over.
 void end(const state::Reader& read) {
   if (!read.is_at_end()) throw std::invalid_argument("state of an existence is too long");
 }
@@ -19,7 +19,7 @@ void archive_point(Archive& a, S& saved) {
   a(saved.version, saved.shell_kind, saved.odds, saved.pass, saved.numbers, saved.shell);
 }
 
-/// Models of version 1 end before what was learned of all histories.
+/// Models of version 1 end before the estimates from all histories.
 template <class Archive, class S>
 void archive_model(Archive& a, S& saved) {
   a(saved.version, saved.pass, saved.recall, saved.births, saved.decay);
@@ -52,10 +52,10 @@ TrackedPoint decode(const existence::ExistenceModel& model, std::string_view byt
   archive_point(read, saved);
   model::Utime looked_utime = 0;
   read(looked_utime);
-  // States of older maps end here: what they know was confirmed or left use.
+  // States of older maps end here: their landmarks were confirmed or left use.
   std::uint8_t is_confirmed = 1;
   if (!read.is_at_end()) read(is_confirmed);
-  // Or here: P follows what the map has learned.
+  // Or here: P is based on the map's estimate.
   double judged_by = model.learned().before;
   if (!read.is_at_end()) read(judged_by);
   end(read);

@@ -1,4 +1,4 @@
-// Which landmarks are used: what is improbable is not.
+// Takes improbable landmarks out of use.
 #pragma once
 
 #include <cstdint>
@@ -8,36 +8,33 @@
 
 namespace understory::existence_tracker {
 
-/// Takes landmarks out of use and into use again, and counts them.
-/// `may_be_used`: false for a new landmark while most of what is new turns out
-/// to be false.
+/// Takes landmarks out of use and into use again, and counts them. `may_be_used`: false for a new
+/// landmark while most new ones turn out to be false.
 class UseOfLandmarks {
  public:
   /// Without landmarks.
   explicit UseOfLandmarks(const UseParameters& parameters = {}) : parameters_(parameters) {}
 
-  /// Decides by the landmark's probability as it is now.
+  /// Decides by the landmark's present probability.
   void decide(TrackedPoint& tracked, bool may_be_used);
-  /// What left use by looks of this pass that turn out to have been hidden
-  /// never left.
+  /// Undoes a removal from use if its looks in this pass turn out to have been occluded.
   void take_back(TrackedPoint& tracked, bool may_be_used);
 
   /// A landmark was added ...
   void add(const TrackedPoint& tracked) { unused_ += tracked.is_in_use ? 0 : 1; }
   /// ... or is erased.
   void erase(const TrackedPoint& tracked) { unused_ -= tracked.is_in_use ? 0 : 1; }
-  /// Other landmarks from now on: add() each.
+  /// Starts with other landmarks: call add() for each.
   void begin_anew() { unused_ = 0; }
 
-  /// Landmarks that are not used now.
+  /// Number of landmarks out of use.
   std::uint32_t unused() const { return unused_; }
   /// Landmarks taken out of use so far.
   std::uint64_t dropped() const { return dropped_; }
   /// Landmarks taken into use again so far.
   std::uint64_t readmitted() const { return readmitted_; }
 
-  /// Members of a saved state; see common/state. After a load add() each
-  /// landmark.
+  /// Members of a saved state; see common/state. After a load call add() for each landmark.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.dropped_, self.readmitted_);

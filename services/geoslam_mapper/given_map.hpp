@@ -38,8 +38,8 @@ class GivenFrame {
  public:
   /// Zero uncertainty: no map was given, or one without keyframes (a survey).
   GivenFrame() = default;
-  /// Frame of this map. Keyframes with invalid values are skipped; of keyframes within kApart_m (5
-  /// m) of each other one is kept.
+  /// Frame of this map. Keyframes with invalid values are skipped; of keyframes within kApart_m
+  /// (5 m) of each other one is kept.
   explicit GivenFrame(const model::WholeMap& map);
 
   /// Number of the map; 0 if none was given.

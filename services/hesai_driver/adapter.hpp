@@ -1,4 +1,4 @@
-// The Hesai driver between the network and the bus.
+// Connects the Hesai driver to the network and the bus.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ struct HesaiDriverChannels {
 };
 
 /// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to
-/// start with a wrong configuration, and ends with status 1 where a port is taken.
+/// start with an invalid configuration, and ends with status 1 if a port is in use.
 bus::Service hesai_driver_service(const HesaiDriverChannels& channels = {});
 
 }  // namespace understory::hesai_driver

@@ -1,4 +1,4 @@
-// The Hesai driver as a process. Its channels: HesaiDriverChannels in adapter.hpp, and --help.
+// The Hesai driver's process. Its channels: HesaiDriverChannels in adapter.hpp, and --help.
 #include "services/hesai_driver/adapter.hpp"
 
 int main(int argc, char** argv) {

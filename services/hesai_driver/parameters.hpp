@@ -13,9 +13,9 @@ struct HesaiPortParameters {
   int data = packets::kHesaiPort;
 };
 
-/// Which sensor it is.
+/// The sensor's model and calibration.
 struct HesaiSensorParameters {
-  std::string model = "xt32";  ///< A name that packets::hesai_model() takes.
+  std::string model = "xt32";  ///< A name for packets::hesai_model().
   std::string angle_file;      ///< The sensor's own angle correction file (CSV); empty = nominal.
 };
 

@@ -1,4 +1,4 @@
-// A laser's driver between the network and the bus, whoever made the laser.
+// Connects a laser's driver of any maker to the network and the bus.
 #pragma once
 
 #include <fmt/format.h>
@@ -19,25 +19,25 @@
 
 namespace understory::lidar_driver {
 
-/// Names of the channels that a driver publishes on; empty = it has none of the kind.
+/// Names of the channels that a driver publishes on; empty = not published.
 struct DriverChannels {
   std::string sweep;
   std::string imu;
   std::string gnss;
 };
 
-/// What the adapter needs of a family's parameters.
+/// Settings of the adapter, from a family's parameters.
 struct DriverSettings {
   NetworkParameters network;
-  std::vector<PortSettings> ports;  ///< The first one is that of points.
+  std::vector<PortSettings> ports;  ///< The first is the port of point packets.
   double silence_s = 1.0;
   bool publishes_imu = false;
   bool publishes_gnss = false;
 };
 
-/// Gives a family's stage its packets and publishes what comes of them. `Family` has `Parameters`,
-/// `Stage` (add, finish, clock_fault and summary as PacketStage), `describe(Parameters&, table)`,
-/// `settings(const Parameters&, channels)` and `make_stage(const Parameters&)`, which throw
+/// Passes packets to a family's stage and publishes the results. `Family` has `Parameters`, `Stage`
+/// (add, finish, clock_fault and summary as PacketStage), `describe(Parameters&, table)`,
+/// `settings(const Parameters&, channels)` and `make_stage(const Parameters&)`; the last two throw
 /// ConfigurationError.
 template <class Family>
 class DriverAdapter : public bus::Adapter, public bus::Device {
@@ -77,7 +77,7 @@ class DriverAdapter : public bus::Adapter, public bus::Device {
     silence_.start(now_us);
     if (summed_us_ < 0) summed_us_ = now_us;
 
-    // What has come.
+    // Processes the received packets.
     for (std::size_t port = 0; port < sockets_->size(); ++port) {
       for (int i = 0; i < kPacketsAtOnce; ++i) {
         const auto datagram = (*sockets_)[port].receive();
@@ -87,7 +87,7 @@ class DriverAdapter : public bus::Adapter, public bus::Device {
     }
     outputs_.sweeps.send_part();
 
-    // What is wrong.
+    // Reports faults.
     report(sockets_->new_faults(), channels_.sweep);
     watch(now_us);
     if (now_us - summed_us_ >= kSummaryPeriod_us) sum_up(now_us);
@@ -163,7 +163,7 @@ class DriverAdapter : public bus::Adapter, public bus::Device {
                     channels_.sweep);
   }
 
-  /// Once a second, so that HEALTH keeps the state for as long as it lasts.
+  /// Reports once a second, so that HEALTH keeps the state as long as it lasts.
   void watch(std::int64_t now_us) {
     const SilenceWatch::Due due = silence_.look(now_us);
     if (due == SilenceWatch::Due::kReportSilence) {
@@ -194,7 +194,7 @@ class DriverAdapter : public bus::Adapter, public bus::Device {
   SenderFilter sender_;
   SilenceWatch silence_;
   Outputs outputs_;
-  std::int64_t summed_us_ = -1;  ///< When the counts were last logged, monotonic.
+  std::int64_t summed_us_ = -1;  ///< Time of the last log of the counts, monotonic.
   std::string summary_;          ///< As last logged.
 };
 

@@ -1,4 +1,4 @@
-// How far the computer's clock is ahead of a sensor's, by the packets that were least delayed.
+// Offset of the computer's clock minus a sensor's, from the least delayed packets.
 #pragma once
 
 #include <algorithm>
@@ -9,10 +9,11 @@
 
 namespace understory::lidar_driver {
 
-/// The least difference of the last ten to twenty seconds: packets are delayed, never early.
+/// The least difference of the last ten to twenty seconds: packets can be late, but never early.
 class LeastDelay {
  public:
-  /// A packet with `utime` by the sensor's clock came at `received` by the computer's [us].
+  /// Adds a packet with `utime` by the sensor's clock, received at `received` by the computer's
+  /// [us].
   void add(model::Utime utime, model::Utime received) {
     const model::Utime period = utime / kPeriod_us;
     if (period != period_) {
@@ -35,7 +36,7 @@ class LeastDelay {
   static constexpr model::Utime kPeriod_us = 10'000'000;
   static constexpr model::Utime kNone = std::numeric_limits<model::Utime>::max();
   model::Utime now_ = kNone;     ///< Least of this period.
-  model::Utime before_ = kNone;  ///< Least of the one before.
+  model::Utime before_ = kNone;  ///< Least of the previous period.
   model::Utime period_ = 0;
 };
 

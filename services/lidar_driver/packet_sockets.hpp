@@ -1,4 +1,4 @@
-// The ports that a laser sends to, and sweeps on their way to the bus.
+// The UDP ports of a laser, and the queue of sweeps to publish.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +16,18 @@
 
 namespace understory::lidar_driver {
 
-/// The sockets of a sensor's ports, and which of their faults have been reported.
+/// The sockets of a sensor's ports, and the reporting of their faults.
 class PacketSockets {
  public:
-  /// Throws std::runtime_error where a port is taken.
+  /// Throws std::runtime_error if a port is in use.
   PacketSockets(const NetworkParameters& network, const std::vector<PortSettings>& ports);
 
   std::size_t size() const { return sockets_.size(); }                 ///< Number of ports.
   UdpSocket& operator[](std::size_t port) { return *sockets_[port]; }  ///< In the given order.
   const UdpSocket& operator[](std::size_t port) const { return *sockets_[port]; }
-  /// To be polled.
+  /// For poll().
   std::vector<int> file_descriptors() const;
-  /// Packets that the kernel threw away so far.
+  /// Number of packets that the kernel dropped.
   std::uint64_t overruns() const;
   /// Overruns and network errors since the last call.
   std::vector<wire::Refusal> new_faults();
@@ -38,16 +38,16 @@ class PacketSockets {
   std::uint64_t errors_reported_ = 0;
 };
 
-/// Parts of sweeps that wait to be published. Publishing is paced, so parts go out one at a time
-/// and the sockets are emptied in between.
+/// Parts of sweeps that wait to be published. Publishing is paced: parts are sent one at a time,
+/// and the sockets are read in between.
 class SweepOutbox {
  public:
-  /// Without a channel: nothing must be posted.
+  /// Without a channel: post() must not be called.
   SweepOutbox() = default;
   /// Publishes on `sweeps`.
   explicit SweepOutbox(bus::Publisher<model::PointSweep> sweeps) : sweeps_(sweeps) {}
 
-  /// False: too many parts wait, and the sweep is left out.
+  /// False: too many parts wait, and the sweep is discarded.
   bool post(const model::PointSweep& sweep);
   /// Publishes one part, if there is any.
   void send_part();

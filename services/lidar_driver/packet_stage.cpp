@@ -58,7 +58,7 @@ void PacketStage::report_new(DriverOutput& output) {
 DriverOutput PacketStage::add(std::size_t /*port*/, std::span<const std::uint8_t> bytes,
                               std::size_t size, model::Utime received) {
   DriverOutput output;
-  // A packet that was cut off on its way is shorter than any.
+  // A truncated packet is decoded as an empty one.
   packets::Readings readings =
       packets::add(decoder_, {size == bytes.size() ? bytes : bytes.first(0), received});
   if (readings.fault) {

@@ -1,8 +1,8 @@
-// The stage of the drivers whose sensors give their full time: packets in, sweeps and samples out,
-// and what is wrong with the packets.
+// The stage of drivers whose sensors send the full time: packets in, sweeps, samples and packet
+// faults out.
 //
-// Stamps: with time source "sensor" those of the decoder, so that a capture's import has the same.
-// With "received" the offset between the clocks, by the packets that were least delayed, is added.
+// Stamps: with time source "sensor" those of the decoder, equal to the import of a capture. With
+// "received" the offset between the clocks, from the least delayed packets, is added.
 #pragma once
 
 #include <optional>
@@ -15,19 +15,19 @@
 
 namespace understory::lidar_driver {
 
-/// Decodes packets, stamps what is in them and says what is wrong. No state outlives a restart.
+/// Decodes packets, stamps their content and reports faults. No state survives a restart.
 class PacketStage {
  public:
   /// `decoder`: of a sensor with a SensorClock.
   PacketStage(packets::Decoder decoder, TimeParameters time);
 
-  /// Takes a packet of any of the sensor's ports. `size`: of the packet as sent, where `bytes`
-  /// holds only its begin. `received`: by the computer's clock [us].
+  /// Adds a packet of any of the sensor's ports. `size`: of the packet as sent, if `bytes` holds
+  /// only its beginning. `received`: by the computer's clock [us].
   DriverOutput add(std::size_t port, std::span<const std::uint8_t> bytes, std::size_t size,
                    model::Utime received);
-  /// The sweep in progress, where it is almost whole.
+  /// The sweep in progress, if it is almost complete.
   std::optional<model::PointSweep> finish();
-  /// What is wrong with the sensor's clock now, if anything is.
+  /// Present fault of the sensor's clock, if any.
   std::optional<wire::Refusal> clock_fault() const;
   /// The counts since the start, for LOG.
   std::string summary(const SocketCounts& sockets) const;
@@ -46,8 +46,8 @@ class PacketStage {
   std::uint64_t imu_samples_ = 0;
 };
 
-/// The stage of a sensor. `sensor.source`: a file to be read, as the parameter `key` says; empty =
-/// none. Throws ConfigurationError, which names `key`.
+/// The stage of a sensor. `sensor.source`: a file to read, from the parameter `key`; empty = none.
+/// Throws ConfigurationError with `key` in the message.
 PacketStage make_stage(packets::SensorDescription sensor, const std::string& key,
                        const TimeParameters& time);
 

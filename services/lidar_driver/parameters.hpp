@@ -1,4 +1,4 @@
-// Parameters that every laser's driver has.
+// Parameters common to all drivers of lasers.
 #pragma once
 
 #include <string>
@@ -7,21 +7,22 @@
 
 namespace understory::lidar_driver {
 
-/// Where packets come from and to, but for the ports.
+/// Network addresses, without the ports.
 struct NetworkParameters {
   /// 0.0.0.0 = every address of this computer; with another one no broadcasts are received.
   std::string bind_address = "0.0.0.0";
-  std::string sensor_address;          ///< Packets of others are refused; empty = the first one.
-  int receive_buffer_bytes = 4194304;  ///< Asked of the kernel.
+  std::string
+      sensor_address;  ///< Packets from other senders are refused; empty = the first sender.
+  int receive_buffer_bytes = 4194304;  ///< Requested from the kernel.
 };
 
-/// What is taken of the sensor.
+/// Limits of range and of silence.
 struct RangeParameters {
   double max_range_m = 0.0;  ///< 0 = the model's.
-  double silence_s = 1.0;    ///< Without a good packet for so long the sensor is silent.
+  double silence_s = 1.0;    ///< Time without a good packet after which the sensor is silent.
 };
 
-/// Whose clock stamps the sweeps.
+/// Clock of the sweeps' stamps.
 struct TimeParameters {
   std::string source = "sensor";  ///< "sensor" or "received".
   double tolerance_s = 0.5;       ///< A sensor's clock farther from the computer's is reported.
@@ -42,11 +43,11 @@ void describe(NetworkParameters& p, bus::ParameterTable& table, Ports ports) {
 void describe_port(const std::string& key, int& port, bus::ParameterTable& table);
 /// Adds `sensor.max_range_m` and `sensor.silence_s`.
 void describe(RangeParameters& p, bus::ParameterTable& table);
-/// Adds `time.*`; `sources` says what the two sources are.
+/// Adds `time.*`; `sources` describes the two sources.
 void describe(TimeParameters& p, bus::ParameterTable& table, const std::string& sources);
-/// Throws ConfigurationError where an address is none.
+/// Throws ConfigurationError on an invalid address.
 void check_addresses(const NetworkParameters& network);
-/// The text of a file that a parameter names. Throws ConfigurationError, which names `key`.
+/// The text of a file that a parameter names. Throws ConfigurationError with `key` in the message.
 std::string read_parameter_file(const std::string& key, const std::string& path);
 
 }  // namespace understory::lidar_driver

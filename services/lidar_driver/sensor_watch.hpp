@@ -1,4 +1,4 @@
-// Which sensor's packets are taken, and whether it is silent.
+// Selects the sensor by its address, and detects its silence.
 #pragma once
 
 #include <cstdint>
@@ -7,21 +7,22 @@
 
 namespace understory::lidar_driver {
 
-/// Lets the packets of one sensor through: those of two on one port would be mixed into one sweep.
+/// Accepts the packets of one sensor: packets of two sensors on one port would be mixed in one
+/// sweep.
 class SenderFilter {
  public:
-  /// `address`: IPv4 of the sensor; empty = the first one that sends a good packet.
+  /// `address`: IPv4 of the sensor; empty = the first sender of a good packet.
   void fix(const std::string& address);
-  /// Whether the packet is of the sensor, or no sensor is known yet; else it is counted.
+  /// Whether the packet is from the sensor, or no sensor is known yet; else it is counted.
   bool admits(std::uint32_t sender);
-  /// A good packet came from here: its sender is the sensor from now on.
+  /// Sets the sensor: the sender of a good packet.
   void set_sensor(std::uint32_t sender) { sensor_ = sender; }
-  /// The sensor has been silent: unless the address is fixed, another one may take its place.
+  /// After silence of the sensor: unless the address is fixed, another sensor may replace it.
   void forget();
 
   /// Host's byte order; none before the first good packet.
   std::optional<std::uint32_t> sensor() const { return sensor_; }
-  /// Packets of other senders so far.
+  /// Number of packets from other senders.
   std::uint64_t refused() const { return refused_; }
 
  private:
@@ -30,24 +31,24 @@ class SenderFilter {
   std::uint64_t refused_ = 0;
 };
 
-/// When the sensor last sent a good packet, and when to report on it: at once when it goes silent,
-/// then once a second. Times are monotonic [us].
+/// Time of the sensor's last good packet, and when to report: at once when it becomes silent, then
+/// once a second. Times are monotonic [us].
 class SilenceWatch {
  public:
-  /// What is to be done now.
+  /// Action due now.
   enum class Due : std::uint8_t {
     kNothing,
-    kCheckClock,     ///< A second has passed, and packets come.
+    kCheckClock,     ///< A second has passed, and packets arrive.
     kReportSilence,  ///< The sensor is silent.
   };
 
-  /// `silence_s`: without a good packet for so long the sensor is silent.
+  /// `silence_s`: time without a good packet after which the sensor is silent.
   void set_silence_s(double silence_s) { silence_us_ = static_cast<std::int64_t>(1e6 * silence_s); }
-  /// The first call starts the watch; later ones change nothing.
+  /// The first call starts the watch; later calls do nothing.
   void start(std::int64_t now_us);
-  /// A good packet came. True where the sensor was reported silent before.
+  /// Records a good packet. True if the sensor was reported silent before.
   bool hear(std::int64_t now_us);
-  /// What is to be done at `now_us`.
+  /// Action due at `now_us`.
   Due look(std::int64_t now_us);
 
   /// Whether the last good packet is too long ago.
@@ -59,7 +60,7 @@ class SilenceWatch {
 
  private:
   std::int64_t silence_us_ = 1'000'000;
-  std::int64_t good_us_ = -1;  ///< When the last good data packet came.
+  std::int64_t good_us_ = -1;  ///< Time of the last good data packet.
   std::int64_t reported_us_ = -1;
   bool is_silent_ = false;
 };

@@ -1,4 +1,4 @@
-// The Livox driver between the network and the bus.
+// Connects the Livox driver to the network and the bus.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ struct LivoxDriverChannels {
 };
 
 /// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to
-/// start with a wrong configuration, and ends with status 1 where a port is taken.
+/// start with an invalid configuration, and ends with status 1 if a port is in use.
 bus::Service livox_driver_service(const LivoxDriverChannels& channels = {});
 
 }  // namespace understory::livox_driver

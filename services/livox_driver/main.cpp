@@ -1,4 +1,4 @@
-// The Livox driver as a process. Its channels: LivoxDriverChannels in adapter.hpp, and --help.
+// The Livox driver's process. Its channels: LivoxDriverChannels in adapter.hpp, and --help.
 #include "services/livox_driver/adapter.hpp"
 
 int main(int argc, char** argv) {

@@ -14,13 +14,13 @@ struct LivoxPortParameters {
   int imu = packets::LivoxPorts{}.imu;
 };
 
-/// Which sensor it is.
+/// The sensor's model and sweep period.
 struct LivoxSensorParameters {
   std::string model = "mid360";  ///< "mid360" or "hap".
   double period_s = 0.1;         ///< Of a sweep: the pattern does not repeat.
 };
 
-/// The IMU inside of the laser.
+/// The IMU inside the laser.
 struct LivoxImuParameters {
   bool is_published = true;  ///< False: another unit on the vehicle gives RAW_IMU.
 };

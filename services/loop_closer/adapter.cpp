@@ -30,7 +30,7 @@ class LoopCloserAdapter : public bus::Adapter {
     stage_ = std::make_unique<LoopCloser>(parameters_);
     watch_ = HealthWatch(health_);
 
-    // A search takes longer than a keyframe, now and then: long queues.
+    // A search sometimes takes longer than the interval of keyframes: long queues.
     node.subscribe<model::Keyframe>(
         channels_.keyframe, [this](const model::Keyframe& keyframe) { stage_->add(keyframe); },
         {.queue_size = 500});
@@ -40,7 +40,7 @@ class LoopCloserAdapter : public bus::Adapter {
     node.subscribe<model::MapUpdate>(channels_.slam_update,
                                      [this](const model::MapUpdate& update) { add(update); },
                                      {.queue_size = 500});
-    // Sent again until a store has it: it may come twice.
+    // Repeated until a store confirms it: it may arrive twice.
     node.subscribe<model::Submap>(channels_.submap,
                                   [this](const model::Submap& submap) { stage_->add(submap); },
                                   {.queue_size = 200, .timed = false});

@@ -1,4 +1,4 @@
-// The loop closer on the bus.
+// Connects the loop closer to the bus.
 #pragma once
 
 #include <string>
@@ -18,8 +18,8 @@ struct LoopCloserChannels {
   std::string loop_closure = all.out("LOOP_CLOSURE", "two places and their relative pose");
 };
 
-/// The process: its name, its channels and how to make its adapter. The stage is made when the
-/// service is bound, by the parameters that are then in force.
+/// The service: its name, its channels and the factory of its adapter. The stage is made when the
+/// service is bound, with the parameters of that time.
 bus::Service loop_closer_service(const LoopCloserChannels& channels = {});
 
 }  // namespace understory::loop_closer

@@ -11,8 +11,8 @@
 namespace understory::loop_closer {
 namespace {
 
-/// No expectation is better than this [m], [rad], standard deviations: a drive's first metres, and
-/// what the covariances leave out.
+/// Least standard deviations of an expectation [m], [rad]: for a drive's first metres, and for
+/// errors that are missing in the covariances.
 constexpr double kLeastM = 0.5;
 constexpr double kLeastRad = 0.02;
 

@@ -1,4 +1,4 @@
-// What HEALTH says of the loop closer beside faults of single messages.
+// HEALTH of the loop closer, beside faults of single messages.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace understory::loop_closer {
 
-/// When the loop closer is not well. Ranges and meanings: describe().
+/// Limits of the loop closer's health conditions. Ranges and meanings: describe().
 struct HealthParameters {
   bus::ConditionLimits refused{8, 4};
   bus::ConditionLimits diverged{16, 12};
@@ -19,19 +19,19 @@ struct HealthParameters {
 /// Adds the parameters to the table.
 void describe(HealthParameters& parameters, bus::ParameterTable& table);
 
-/// Judges the loop closer by what becomes of its closures. `input_refused`: the mapper refuses
-/// them. `diverged`: they contradict its map, and still wait for others that agree.
-/// `parts_missing`: keyframes do not come that the mapper has, or clouds that are compared.
+/// Derives the loop closer's health from the results of its closures. `input_refused`: the mapper
+/// refuses them. `diverged`: they contradict its map, and wait for others that agree.
+/// `parts_missing`: keyframes that the mapper received, or clouds for comparison, do not arrive.
 class HealthWatch {
  public:
-  /// All is well so far.
+  /// No condition is raised.
   explicit HealthWatch(const HealthParameters& parameters = {});
 
-  /// What the mapper did with one of ours.
+  /// The mapper's result for one of our closures.
   void add(const model::LoopResult& result);
   /// An update of a keyframe, with the counts before and after it.
   void add(const LoopCounters& before, const LoopCounters& after);
-  /// What to show.
+  /// The conditions for HEALTH.
   std::array<bus::WatchedCondition, 4> conditions() const {
     return {refused_, diverged_, missing_, clouds_};
   }

@@ -1,4 +1,4 @@
-// Whether the mapper knows already that the vehicle was here before.
+// Whether the mapper already localises the vehicle on an earlier pass.
 #pragma once
 
 #include <algorithm>
@@ -10,16 +10,16 @@
 
 namespace understory::loop_closer {
 
-/// Ids of landmarks grow in the order in which the mapper found them: an id that there was a good
-/// way back is of a landmark of an earlier pass.
+/// Ids of landmarks grow in the order of their discovery: an id that existed `back_m` of path ago
+/// belongs to a landmark of an earlier pass.
 class KnownGround {
  public:
-  /// Landmarks are of an earlier pass that were there `back_m` ago [m of path].
+  /// `back_m`: path length after which a landmark belongs to an earlier pass [m].
   explicit KnownGround(double back_m) : back_m_(back_m) {}
 
-  /// Forgets everything: another map.
+  /// Clears everything, for another map.
   void restart() { *this = KnownGround(back_m_); }
-  /// A keyframe that the mapper placed, at this path [m].
+  /// Adds a localised keyframe, at this path length [m].
   void add(const model::MapUpdate& update, double along_m) {
     if (newest_.empty() || along_m >= newest_.back().along_m + kStepM)
       newest_.push_back({along_m, newest_.empty() ? 0 : newest_.back().newest});
@@ -35,8 +35,8 @@ class KnownGround {
     counts_.emplace_back(update.associations.size(), static_cast<std::size_t>(old));
     if (counts_.size() > kKeyframes) counts_.pop_front();
   }
-  /// Whether at least this share of the landmarks of the last keyframes is of earlier passes, and
-  /// three.
+  /// Whether at least this share of the landmarks of the last keyframes, and at least three, are of
+  /// earlier passes.
   bool is_known(double share) const {
     std::size_t all = 0;
     std::size_t old = 0;
@@ -54,7 +54,7 @@ class KnownGround {
   }
 
  private:
-  static constexpr double kStepM = 2.0;  ///< Who stands still needs no memory.
+  static constexpr double kStepM = 2.0;  ///< Memory does not grow while the vehicle stands.
   static constexpr std::size_t kKeyframes = 5;
   struct Newest {
     double along_m = 0.0;

@@ -12,15 +12,15 @@ namespace understory::loop_closer {
 namespace {
 
 constexpr state::Format kFormat{"loop_closer", 2};
-/// Numbers of our closures begin here: those of persons are below.
+/// First id of our closures: smaller ids are for closures set by hand.
 constexpr std::uint64_t kFirstId = std::uint64_t{1} << 40;
-/// Where pairs are all that speaks for a place, it has so many more than one elsewhere.
+/// If pairs are the only evidence for a place, it must have this many more pairs than a rival.
 constexpr std::size_t kAheadOfRivals = 2;
-/// Evidence of a wrong pose over the self-likeness of the two places: 1.6 at most where trees stand
-/// within 0.1 m of their grid, since the surroundings of a place hold more stems than one window
-/// (docs/decisions/157).
+/// Largest ratio of a wrong pose's evidence to the self-likeness of the two places: at most 1.6 was
+/// measured for trees within 0.1 m of their grid, since the surroundings of a place hold more stems
+/// than one window (docs/decisions/157).
 constexpr double kOverSelfLikeness = 2.0;
-/// Decades of self-likeness that chance gives to a place of few stems in a forest.
+/// Decades of self-likeness by chance of a place with few stems in a forest.
 constexpr double kSelfLikenessByChance = 6.0;
 
 bool is_placed(const model::MapUpdate& update) {
@@ -28,12 +28,12 @@ bool is_placed(const model::MapUpdate& update) {
          update.status == model::MapUpdateStatus::kUpdated;
 }
 
-/// What the state keeps is what the search gets: a restart gives the same answers.
+/// The search uses the stems in their stored form: a restart gives the same results.
 std::vector<LevelStem> as_kept(std::span<const LevelStem> stems) {
   return place_recognition::PackedStems(stems).unpacked();
 }
 
-/// An end at a place, and how its base lies to it.
+/// The closure's end at a place, and the pose of its base relative to it.
 model::LoopEnd end_at(const Place& place, geometry::SE2WithCovariance& end_T_base) {
   model::LoopEnd end;
   if (place.in_submap) {
@@ -98,7 +98,7 @@ std::optional<model::LoopClosure> LoopCloser::add(const model::MapUpdate& update
   return closure;
 }
 
-/// What was seen around the keyframe's base, where that is enough to tell the place.
+/// The place around the keyframe's base; none with too few stems.
 std::optional<Place> LoopCloser::place_here(const model::MapUpdate& update) {
   Place place;
   place.keyframe = update.keyframe_sequence;
@@ -120,7 +120,7 @@ std::optional<Place> LoopCloser::place_here(const model::MapUpdate& update) {
   return place;
 }
 
-/// The likeliest place, where nothing else can explain what is seen.
+/// The most likely place, if no other explanation is plausible.
 std::optional<model::LoopClosure> LoopCloser::look_for(const Place& place) {
   const std::size_t searched = memory_.count_until(place.along_m - parameters_.places.min_loop_m);
   if (searched == 0 || place.along_m < sent_.accepted_at_m() + parameters_.accept.closed_m)
@@ -159,10 +159,10 @@ std::optional<model::LoopClosure> LoopCloser::look_for(const Place& place) {
   return closure;
 }
 
-/// Fewer poses have to be told from chance where the mapper's poses allow few. What they do not
-/// allow must be surer by itself; the mapper waits for others that agree, then. Of a place without
-/// evidence nobody says what chance gives: verified pairs and no rival are all, and the rest is the
-/// mapper's word.
+/// If the mapper's poses allow only few poses, less evidence against chance is needed. A pose
+/// outside the expectation needs more evidence, and the mapper then waits for other closures that
+/// agree. Without evidence from the detector the probability of chance is unknown: verified pairs
+/// without a rival are required, and the mapper decides the rest.
 LoopCloser::Verdict LoopCloser::judge(const FoundPlace& best, const Place& from, const Place& place,
                                       std::size_t searched) const {
   const AcceptanceParameters& accept = parameters_.accept;
@@ -190,7 +190,8 @@ LoopCloser::Verdict LoopCloser::judge(const FoundPlace& best, const Place& from,
                     best.evidence->margin_decades >= accept.margin_decades && has_pairs;
   if (!verdict.is_sure) return verdict;
 
-  // In rows any pose that is off by a row fits as well, and the best of them has a margin.
+  // In rows of stems a pose that is off by one row fits as well, and the best such pose has a
+  // margin.
   const double likeness = std::max(self_likeness(place.stems, search_.stem_noise()),
                                    self_likeness(from.stems, search_.stem_noise()));
   verdict.log10_false_alarm += kOverSelfLikeness * std::max(0.0, likeness - kSelfLikenessByChance);

@@ -1,4 +1,4 @@
-// Looks for places of the drive where the vehicle has been before.
+// Searches for places of the drive that the vehicle revisits.
 #pragma once
 
 #include <cstdint>
@@ -21,20 +21,20 @@
 
 namespace understory::loop_closer {
 
-/// What happened since the first start (a saved state includes it).
+/// Counts since the first start (a saved state includes them).
 struct LoopCounters {
-  std::uint64_t keyframes = 0;          ///< That the mapper placed.
-  std::uint64_t keyframes_missing = 0;  ///< Updates of keyframes that did not come.
-  std::uint64_t places = 0;             ///< Kept.
-  std::uint64_t without_cloud = 0;      ///< Places left out: clouds are compared, none came.
-  std::uint64_t queries = 0;            ///< Looked for.
+  std::uint64_t keyframes = 0;          ///< Localised by the mapper.
+  std::uint64_t keyframes_missing = 0;  ///< Updates whose keyframe did not arrive.
+  std::uint64_t places = 0;             ///< Stored.
+  std::uint64_t without_cloud = 0;      ///< Places skipped: the method needs clouds, none arrived.
+  std::uint64_t queries = 0;            ///< Places searched for.
   std::uint64_t sent = 0;               ///< Closures.
-  std::uint64_t unexpected = 0;         ///< Of these, against what the mapper's poses allow.
+  std::uint64_t unexpected = 0;         ///< Of these, outside the mapper's expectation.
   std::uint64_t accepted = 0;           ///< By the mapper at once.
   std::uint64_t waiting = 0;            ///< At the mapper, for others that agree.
   std::uint64_t refused = 0;            ///< By the mapper.
-  std::uint64_t revoked = 0;            ///< By anybody.
-  std::uint64_t other_map = 0;          ///< Places found that are of a map that was left.
+  std::uint64_t revoked = 0;            ///< By any process or person.
+  std::uint64_t other_map = 0;          ///< Places found in an earlier map.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -44,10 +44,10 @@ struct LoopCounters {
   }
 };
 
-/// The stage. Every few metres what was seen on the last ones becomes a place. It is looked for
-/// among all places of the drive that lie a good way back, unless the mapper is on ground that it
-/// knows already; a place that is found for sure is told to the mapper as a loop closure (thesis
-/// 002 §2.4, §6.3). The mapper decides what counts: see its smoothing/closures.hpp.
+/// The stage. Every few metres the stems seen on the last metres become a place. It is searched for
+/// among all earlier places of the drive beyond a least path length, unless the mapper already
+/// localises on known ground; a certain match is sent to the mapper as a loop closure (thesis 002
+/// §2.4, §6.3). The mapper decides about acceptance: see its smoothing/closures.hpp.
 class LoopCloser {
  public:
   /// Without places.
@@ -55,26 +55,27 @@ class LoopCloser {
 
   /// A keyframe; its update must come later. At most kMostPending wait.
   void add(const model::Keyframe& keyframe);
-  /// A cloud of one of its scans; the keyframe's update must come later. Ignored where nobody
+  /// A cloud of one of its scans; the keyframe's update must come later. Ignored if no method
   /// compares clouds.
   void add(const model::PlaceScan& scan);
-  /// What became of a keyframe. Gives the loop closure that it shows, if any. Cost: one search
+  /// The mapper's result for a keyframe. Returns the loop closure found, if any. Cost: one search
   /// every `every_m` metres.
   std::optional<model::LoopClosure> add(const model::MapUpdate& update);
-  /// A part of the map that the mapper has given away: its keyframes are ends by their submap now.
+  /// A part of the map that the mapper has handed over: closures now refer to its keyframes by
+  /// their submap.
   void add(const model::Submap& submap) { memory_.follow(submap); }
-  /// What the mapper did with a closure; false where it is none of ours.
+  /// The mapper's result for a closure; false if the closure is not ours.
   bool add(const model::LoopResult& result);
 
   /// Counts for HEALTH and tests.
   const LoopCounters& counters() const { return counters_; }
-  /// The places that are kept.
+  /// The stored places.
   const PlaceMemory& memory() const { return memory_; }
 
   /// The whole state, for a restart. O(places).
   std::string save() const;
-  /// Continues from what save() gave, with the same output. Throws std::invalid_argument on other
-  /// bytes; the state is then as it was. Indexes all places anew.
+  /// Continues from a saved state with the same output. Throws std::invalid_argument on other
+  /// bytes; the state is then unchanged. Indexes all places anew.
   void load(const std::string& state);
 
   /// Members of a saved state; see common/state. Parameters are configuration.
@@ -89,10 +90,10 @@ class LoopCloser {
   std::optional<model::Keyframe> take_pending(std::uint64_t sequence);
   std::optional<Place> place_here(const model::MapUpdate& update);
   std::optional<model::LoopClosure> look_for(const Place& place);
-  /// How sure a found place is.
+  /// Certainty of a found place.
   struct Verdict {
     bool is_sure = false;
-    bool is_expected = false;  ///< The mapper's poses allow it.
+    bool is_expected = false;  ///< It is within the mapper's expectation.
     double log10_false_alarm = 0.0;
   };
   Verdict judge(const FoundPlace& best, const Place& from, const Place& place,
@@ -108,7 +109,7 @@ class LoopCloser {
   PlaceSearch search_;
   SentClosures sent_;
   LoopCounters counters_;
-  double place_at_m_ = 0.0;   ///< Path at which the next place is made.
+  double place_at_m_ = 0.0;   ///< Path length at which the next place is made.
   std::uint32_t map_id_ = 0;  ///< 0 before the first keyframe.
 };
 

@@ -1,4 +1,4 @@
-// The loop closer as a process. Its channels: LoopCloserChannels in adapter.hpp, and --help.
+// The loop closer's process. Its channels: LoopCloserChannels in adapter.hpp, and --help.
 #include "services/loop_closer/adapter.hpp"
 
 int main(int argc, char** argv) {

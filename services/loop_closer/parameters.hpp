@@ -1,13 +1,13 @@
-// Parameters of the loop closer. What each one does, with range and default, is documented once: in
-// adapter_parameters.cpp, which `understory-loop-closer --help` prints. Here stand the units that a
-// name does not give.
+// Parameters of the loop closer. Meaning, range and default of each are documented once: in
+// adapter_parameters.cpp, which `understory-loop-closer --help` prints. The comments here give
+// units that are not in the name.
 #pragma once
 
 #include <string>
 
 namespace understory::loop_closer {
 
-/// What is a place, and where one is looked for again.
+/// Making of places, and when one is searched for.
 struct PlaceParameters {
   double every_m = 4.0;    ///< Path.
   double window_m = 12.0;  ///< Path.
@@ -20,7 +20,7 @@ struct PlaceParameters {
   double error_rad = 0.003;
 };
 
-/// What a found place must show.
+/// Acceptance limits for a found place.
 struct AcceptanceParameters {
   double chance_decades = 6.0;           ///< -log10 of a number of poses.
   double chance_decades_expected = 3.0;  ///< Likewise.
@@ -30,7 +30,7 @@ struct AcceptanceParameters {
   double closed_m = 15.0;  ///< Path.
 };
 
-/// How the stems that a vehicle detects differ from visit to visit.
+/// Differences between the detected stems of two visits.
 struct StemParameters {
   double sigma_m = 0.07;
   double matched_share = 0.6;
@@ -39,7 +39,7 @@ struct StemParameters {
   double triangles = 300.0;
 };
 
-/// Who looks for places, and who verifies what is found (common/place_recognition), by name.
+/// Names of the detector and of the verifier (common/place_recognition).
 struct SearchParameters {
   std::string detector = "stems";
   std::string verifier = "none";
@@ -48,7 +48,7 @@ struct SearchParameters {
   double verified_score = 0.5;  ///< Of verifiers that compare clouds.
 };
 
-/// All of them.
+/// All parameters.
 struct LoopCloserParameters {
   PlaceParameters places;
   SearchParameters search;

@@ -12,7 +12,7 @@ void PlaceClouds::add(model::PlaceScan scan) {
 void PlaceClouds::add(const model::Keyframe& keyframe, const model::MapUpdate& update,
                       double along_m) {
   const geometry::SE2 map_T_centre = update.map_T_vehicle * keyframe.centre_T_base().inverse();
-  // Its base is one of its scans, not the last one.
+  // Its base is one of its scans, but not the last one.
   model::Utime end = keyframe.utime;
   for (const model::KeyframeMember& member : keyframe.members) end = std::max(end, member.utime);
   while (!pending_.empty() && pending_.front().utime <= end) {
@@ -20,7 +20,7 @@ void PlaceClouds::add(const model::Keyframe& keyframe, const model::MapUpdate& u
     pending_.pop_front();
     const auto member =
         std::ranges::find(keyframe.members, scan.utime, &model::KeyframeMember::utime);
-    // Of a scan that went into no keyframe nobody knows where it was taken.
+    // The pose of a scan outside all keyframes is unknown.
     if (member == keyframe.members.end()) continue;
     newest_ = PlacedCloud{along_m, map_T_centre * member->centre_T_vehicle, std::move(scan.points)};
   }

@@ -1,4 +1,4 @@
-// The clouds of the last metres, and where they were taken.
+// The clouds of the last metres, with their poses.
 #pragma once
 
 #include <deque>
@@ -12,7 +12,7 @@
 
 namespace understory::loop_closer {
 
-/// A cloud, and where it was taken.
+/// A cloud with its pose.
 struct PlacedCloud {
   double along_m = 0.0;  ///< Path.
   geometry::SE2 map_T_scan;
@@ -25,19 +25,19 @@ struct PlacedCloud {
   }
 };
 
-/// Joins PLACE_SCAN with the keyframe that has its scan: the mapper says where that one is. Keeps
-/// the newest cloud that was placed, and a few that wait.
+/// Joins PLACE_SCAN with the keyframe of its scan, whose pose the mapper gives. Keeps the newest
+/// cloud with a pose, and a few that wait.
 class PlaceClouds {
  public:
   /// A cloud; the update of its keyframe must come later. At most kMostPending wait.
   void add(model::PlaceScan scan);
-  /// Places the clouds of a keyframe's scans. `along_m`: path at the keyframe.
+  /// Sets the poses of a keyframe's clouds. `along_m`: path at the keyframe.
   void add(const model::Keyframe& keyframe, const model::MapUpdate& update, double along_m);
-  /// The map was corrected: what was placed before counts no more.
+  /// The map was corrected: drops the newest cloud.
   void restart() { newest_.reset(); }
 
-  /// The newest cloud, frame `vehicle_level` of a base at `map_T_base`; empty where none was placed
-  /// at or after `from_m` of path.
+  /// The newest cloud, frame `vehicle_level` of a base at `map_T_base`; empty if there is none at
+  /// or after path length `from_m`.
   std::vector<model::PlacePoint> seen_from(const geometry::SE2& map_T_base, double from_m) const;
 
   /// Members of a saved state; see common/state.

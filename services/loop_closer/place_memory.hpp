@@ -15,7 +15,7 @@ namespace understory::loop_closer {
 
 using place_recognition::LevelStem;
 
-/// Where a keyframe is in a submap that the mapper has given away.
+/// Pose of a keyframe in a submap that the mapper has handed over.
 struct InSubmap {
   model::SubmapId id = 0;
   geometry::SE2WithCovariance submap_T_base;
@@ -26,17 +26,17 @@ struct InSubmap {
   }
 };
 
-/// What was seen around the base of one keyframe.
+/// Stems (and points) around the base of one keyframe.
 struct Place {
   std::uint64_t keyframe = 0;  ///< Its sequence.
   model::Utime utime = 0;
   std::uint32_t map_id = 1;
   double along_m = 0.0;  ///< Path of the vehicle.
-  /// As the mapper told it when the keyframe came: later corrections are within its covariance.
+  /// The mapper's pose when the keyframe arrived: later corrections are within its covariance.
   geometry::SE2WithCovariance map_T_base;
   std::optional<InSubmap> in_submap;  ///< None while the mapper holds the keyframe.
   std::vector<LevelStem> stems;       ///< Frame `vehicle_level` of the base.
-  /// The same frame; empty where nobody compares clouds.
+  /// Same frame; empty if no method compares clouds.
   std::vector<model::PlacePoint> cloud;
 
   template <class Archive, class Self>
@@ -50,19 +50,20 @@ struct Place {
   }
 };
 
-/// Places in order of time. Memory: about 100 bytes, 24 for each stem and 6 for each point.
+/// Places in order of time. Memory per place: about 100 bytes, 24 for each stem and 6 for each
+/// point.
 class PlaceMemory {
  public:
   /// Adds a place. Precondition: its keyframe is later than those before.
   void add(Place place) { places_.push_back(std::move(place)); }
-  /// Takes note of which keyframes went into a submap. O(keyframes of it log places).
+  /// Records which keyframes went into a submap. O(keyframes of it log places).
   void follow(const model::Submap& submap);
 
   /// All of them.
   std::span<const Place> places() const { return places_; }
-  /// The place of a keyframe; null where it has none. O(log places).
+  /// The place of a keyframe; null if it has none. O(log places).
   const Place* of_keyframe(std::uint64_t keyframe) const;
-  /// How many places lie at or before this path [m]. O(log places).
+  /// Number of places at or before this path length [m]. O(log places).
   std::size_t count_until(double along_m) const;
 
   /// Members of a saved state; see common/state.

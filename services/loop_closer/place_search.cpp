@@ -55,7 +55,7 @@ std::string fault_of(const SearchParameters& search) {
       return is_sure ? std::string()
                      : "search.verifier = \"none\": the score of detector \"" + search.detector +
                            "\" is no probability; correspondence_graph verifies it";
-    // Throws where there is none of that name.
+    // Throws if the name is unknown.
     (void)place_recognition::verifier_wants_cloud(search.verifier);
   } catch (const std::invalid_argument& error) {
     return std::string("search: ") + error.what();

@@ -1,4 +1,4 @@
-// Where among the places of the drive a new one lies.
+// Search for a new place among the places of the drive.
 #pragma once
 
 #include <cstddef>
@@ -16,32 +16,31 @@
 
 namespace understory::loop_closer {
 
-/// What is wrong with the choice of detector and verifier, with the key in front; empty where
-/// nothing is.
+/// Fault of the configured detector and verifier, with the key in front; empty if there is none.
 std::string fault_of(const SearchParameters& search);
-/// Whether detector or verifier compare clouds. Precondition: fault_of() finds nothing.
+/// Whether detector or verifier compare clouds. Precondition: fault_of() returns no fault.
 bool wants_clouds(const SearchParameters& search);
 
-/// Detector and verifier, of those that `common/place_recognition` has. The places are its only
-/// state, so it is made again from them.
+/// Detector and verifier from `common/place_recognition`. Their only state is the places, so a load
+/// rebuilds it from them.
 class PlaceSearch {
  public:
-  /// Without places. Throws std::invalid_argument where fault_of() finds something.
+  /// Without places. Throws std::invalid_argument if fault_of() returns a fault.
   PlaceSearch(const SearchParameters& search, const StemParameters& stems);
 
   /// Adds a place. Precondition: its keyframe is later than those before.
   void add(const Place& place);
-  /// Looks for a place among those of keyframes up to `newest`; the one that answers first.
-  /// `memory` has them all. The same places give the same answer.
+  /// Searches for a place among those of keyframes up to `newest`, best match first. `memory` has
+  /// them all. The same places give the same result.
   std::vector<FoundPlace> find(const Place& place, std::uint64_t newest,
                                const PlaceMemory& memory) const;
-  /// Most poses that chance has around one place, of those that can be told apart.
+  /// Largest number of distinguishable poses around one place.
   double poses_per_place() const;
-  /// Distance of two places that are found [m].
+  /// Largest distance of two matching places [m].
   double reach_m() const { return reach_m_; }
-  /// Who finds and verifies, as LOOP_CLOSURE tells it.
+  /// Names of detector and verifier, as in LOOP_CLOSURE.
   const std::string& source() const { return source_; }
-  /// Of the detector of stems.
+  /// Noise model of the stem detector.
   const place_recognition::StemNoise& stem_noise() const { return stem_noise_; }
 
  private:
@@ -49,10 +48,11 @@ class PlaceSearch {
   std::string source_;
   place_recognition::StemNoise stem_noise_;
   std::unique_ptr<place_recognition::PlaceDetector> detector_;
-  std::unique_ptr<PlaceVerification> verification_;  ///< None: the detector's evidence is enough.
+  std::unique_ptr<PlaceVerification>
+      verification_;  ///< Null: the detector's evidence is sufficient.
 };
 
-/// Poses that are told apart [m], [rad]: by these chance has so many.
+/// Cell size of distinguishable poses [m], [rad], for counting poses.
 inline constexpr double kPoseCellM = 0.1;
 inline constexpr double kPoseCellRad = 0.01;
 

@@ -13,14 +13,14 @@ using place_recognition::PlaceFrame;
 using place_recognition::ScoredPlace;
 
 constexpr const char* kGraph = "correspondence_graph";
-/// Two who look at the same landmarks agree on the pose so well [m], [rad] ...
+/// Two results from the same landmarks agree if their poses differ by less than this [m], [rad] ...
 constexpr double kAgreeM = 0.3;
 constexpr double kAgreeRad = 0.03;
-/// ... and where one of them knows only a part of it, the other is within so many squared standard
-/// deviations: 99.9 % of three degrees of freedom.
+/// ... or, if one of them leaves a direction undetermined, by less than this squared Mahalanobis
+/// distance: 99.9 % of three degrees of freedom.
 constexpr double kAgreeChi2 = 16.27;
-/// Two candidates that put the query so far apart [m], [rad] are rivals: farther than odometry is
-/// off between places that show one another.
+/// Two candidates whose poses of the query differ by more than this [m], [rad] are rivals: more
+/// than odometry's error between places in view of each other.
 constexpr double kElsewhereM = 3.0;
 constexpr double kElsewhereRad = 0.2;
 
@@ -29,7 +29,7 @@ bool are_near(const geometry::SE2& a, const geometry::SE2& b, double near_m, dou
   return off.translation().norm() <= near_m && std::abs(off.theta()) <= near_rad;
 }
 
-/// Whether two results are one, by how well each is known.
+/// Whether two results agree, given their covariances.
 bool agree(const geometry::SE2WithCovariance& a, const geometry::SE2WithCovariance& b) {
   return are_near(a.mean, b.mean, kAgreeM, kAgreeRad) || squared_distance(a, b) <= kAgreeChi2;
 }
@@ -38,7 +38,7 @@ geometry::SE2WithCovariance pose_of(const place_recognition::VerifiedPlace& veri
   return {verified.frame_T_query, verified.covariance};
 }
 
-/// Where a found place puts the query, frame `map`.
+/// Pose of the query by a found place, frame `map`.
 geometry::SE2 puts_at(const FoundPlace& one, const PlaceMemory& memory) {
   return memory.of_keyframe(one.keyframe)->map_T_base.mean * one.place_T_query.mean;
 }
@@ -91,7 +91,7 @@ std::vector<FoundPlace> PlaceVerification::verified(const PlaceFrame& query,
   return found;
 }
 
-/// Points of a cloud are no landmarks: of those the share that has a partner counts.
+/// Points of a cloud are no landmarks: the share of them with a partner is compared.
 bool PlaceVerification::is_enough(const place_recognition::VerifiedPlace& verified) const {
   return least_score_ ? verified.score >= *least_score_ : verified.inliers >= least_pairs_;
 }
@@ -112,7 +112,7 @@ std::optional<FoundPlace> PlaceVerification::compared(const PlaceFrame& query,
     return FoundPlace{place.keyframe, pose_of(*one), one->inliers};
   }
 
-  // Clouds are compared from where the landmarks put the query: the search is local.
+  // The comparison of clouds starts at the pose by the landmarks: its search is local.
   const auto graph = graph_->verify(query, frame, scored.guesses);
   if (!graph || graph->inliers < least_pairs_) return std::nullopt;
   const std::vector by_graph{pose_of(*graph)};

@@ -1,4 +1,4 @@
-// Candidates of a detector compared with the query in detail.
+// Detailed comparison of a detector's candidates with the query.
 #pragma once
 
 #include <cstddef>
@@ -15,35 +15,37 @@
 
 namespace understory::loop_closer {
 
-/// A place that may be where the query is.
+/// A place that may be the query's place.
 struct FoundPlace {
   std::uint64_t keyframe = 0;  ///< Of the place.
   geometry::SE2WithCovariance place_T_query;
-  std::size_t pairs = 0;  ///< Stems of the query that the place has.
-  /// Most pairs of a candidate that puts the query elsewhere; where the detector gives no evidence.
+  std::size_t pairs = 0;  ///< Stems of the query with a partner in the place.
+  /// Most pairs of a candidate with another pose of the query; only if the detector gives no
+  /// evidence.
   std::size_t rival_pairs = 0;
-  /// What the detector knows of it; none where pairs are all that speaks for it.
+  /// The detector's evidence; none if the pairs are the only evidence.
   std::optional<place_recognition::PlaceEvidence> evidence = std::nullopt;
 };
 
-/// A place as place recognition takes it.
+/// Converts a place to the input of place recognition.
 place_recognition::PlaceFrame frame_of(const Place& place);
 
-/// Verifies what a detector found. A detector whose score is a probability has found the pose
-/// itself: the verifier must agree with it, as a second opinion. Of all others the verifier gives
-/// the pose, and the correspondence graph must agree where another one was chosen: counts of Hough,
-/// the likelihood of stems and the share of partners in clouds do not hold from one forest to the
-/// next (docs/decisions/101). Scan Context finds a heading and no place: the graph's pose counts.
+/// Verifies candidates of a detector. A detector whose score is a probability gives the pose
+/// itself: the verifier must agree with it. For all other detectors the verifier gives the pose,
+/// and if the chosen verifier is not the correspondence graph, the graph must agree: thresholds of
+/// Hough counts, of stem likelihood and of the share of partners in clouds differ between forests
+/// (docs/decisions/101). Scan Context gives a heading but no position: then the graph's pose is
+/// used.
 class PlaceVerification {
  public:
-  /// Precondition: fault_of() finds nothing wrong with the choice, and it has a verifier.
+  /// Precondition: fault_of() returns no fault, and the choice has a verifier.
   PlaceVerification(const SearchParameters& search, bool has_evidence,
                     const place_recognition::VerifierParameters& parameters);
 
-  /// How many candidates it takes.
+  /// Number of candidates that it verifies.
   std::size_t candidates() const { return candidates_; }
-  /// Those that hold, most pairs first; of a detector with evidence its first one, or none. Cost:
-  /// one comparison for each candidate.
+  /// The verified candidates, most pairs first; with a detector's evidence only its first one, or
+  /// none. Cost: one comparison per candidate.
   std::vector<FoundPlace> verified(const place_recognition::PlaceFrame& query,
                                    std::span<const place_recognition::ScoredPlace> scored,
                                    const PlaceMemory& memory) const;
@@ -58,7 +60,7 @@ class PlaceVerification {
   std::size_t least_pairs_;
   std::optional<double> least_score_;  ///< Of a verifier that compares clouds.
   std::unique_ptr<place_recognition::PlaceVerifier> verifier_;
-  std::unique_ptr<place_recognition::PlaceVerifier> graph_;  ///< That must agree; may be none.
+  std::unique_ptr<place_recognition::PlaceVerifier> graph_;  ///< Must agree; may be null.
 };
 
 }  // namespace understory::loop_closer

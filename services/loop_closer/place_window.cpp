@@ -7,14 +7,14 @@
 namespace understory::loop_closer {
 namespace {
 
-/// The mapper's motion and the keyframer's are not the same beyond these: the map was corrected.
+/// The mapper's motion and the keyframer's differ by more than these: the map was corrected.
 constexpr double kCorrectedM = 0.5;
 constexpr double kCorrectedRad = 0.05;
-/// A step that no vehicle drives between two keyframes is a correction, where nothing was tracked.
+/// Without tracking, a longer step between two keyframes is a correction of the map.
 constexpr double kLongestStepM = 200.0;
 
-/// In a window of so many keyframes, what a single one detected is not counted: false detections
-/// come once, trunks again. Of a thin place everything is.
+/// In a window of at least this many keyframes, stems detected only once are ignored: false
+/// detections rarely repeat, trunks do. In a shorter window all are used.
 constexpr std::size_t kManyKeyframes = 4;
 constexpr double kSeenAgain = 2.0;
 

@@ -1,4 +1,4 @@
-// What was seen around the vehicle on the last metres of its path.
+// Stems around the vehicle over the last metres of its path.
 #pragma once
 
 #include <deque>
@@ -15,7 +15,7 @@ namespace understory::loop_closer {
 
 using place_recognition::LevelStem;
 
-/// The keyframe that a window ends with.
+/// The last keyframe of a window.
 struct WindowEnd {
   std::uint64_t sequence = 0;  ///< Of the keyframe.
   geometry::SE2 map_T_base;
@@ -26,28 +26,28 @@ struct WindowEnd {
   }
 };
 
-/// What became of a window with a keyframe.
+/// Effect of a keyframe on the window.
 enum class WindowStep { kWentOn, kBegun };
 
-/// Joins what several keyframes detected of each stem. A single frame may show three stems; what
-/// was seen along the last metres shows enough to tell a place. The mapper says which detections
-/// are one landmark, and how the keyframes lie to each other.
+/// Joins the detections of each stem in several keyframes. A single frame may contain three stems;
+/// the last metres contain enough to identify a place. The mapper gives the association of the
+/// detections and the relative poses of the keyframes.
 class PlaceWindow {
  public:
   /// Without keyframes. `parameters` gives window_m, merge_m, min_stems and most_stems.
   explicit PlaceWindow(const PlaceParameters& parameters) : parameters_(parameters) {}
 
-  /// Adds a keyframe that the mapper placed. Where it does not lie to the last one as it was
-  /// tracked (the mapper has corrected the map between them), the window begins with it.
+  /// Adds a localised keyframe. If its pose relative to the last one contradicts tracking (the
+  /// mapper has corrected the map between them), a new window begins with it.
   WindowStep add(const model::Keyframe& keyframe, const model::MapUpdate& update);
   /// The next keyframe begins the window.
   void restart() { seen_.clear(); }
 
-  /// Path of the vehicle [m] since the window's first beginning.
+  /// Path length of the vehicle [m] since the first keyframe.
   double along_m() const { return along_m_; }
   /// The stems around the last keyframe's base, frame `vehicle_level` of that scan; the nearest
-  /// `most_stems`. Where a window of four keyframes and more shows `min_stems` that were detected
-  /// twice, these alone. O(stems^2).
+  /// `most_stems`. In a window of at least four keyframes with at least `min_stems` stems detected
+  /// twice, only these. O(stems^2).
   std::vector<LevelStem> stems() const;
 
   /// Members of a saved state; see common/state. Parameters are configuration.
@@ -57,7 +57,7 @@ class PlaceWindow {
   }
 
  private:
-  /// A detected stem, frame `map` as it was when its keyframe came.
+  /// A detected stem, frame `map` at the time of its keyframe.
   struct SeenStem {
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
     double diameter_m = 0.0;
@@ -68,7 +68,7 @@ class PlaceWindow {
       a(s.position_m, s.diameter_m, s.landmark);
     }
   };
-  /// What one keyframe detected.
+  /// The detections of one keyframe.
   struct Seen {
     double along_m = 0.0;
     std::vector<SeenStem> stems;

@@ -23,7 +23,7 @@ struct Differences {
 };
 using Cells = std::map<std::pair<int, int>, Differences>;
 
-/// Half of the plane is enough: a shift fits as well as the opposite one.
+/// Half of the plane is sufficient: a shift fits as well as the opposite one.
 Cells differences_of(std::span<const LevelStem> stems) {
   Cells cells;
   for (const LevelStem& one : stems) {
@@ -40,7 +40,7 @@ Cells differences_of(std::span<const LevelStem> stems) {
   return cells;
 }
 
-/// The most frequent ones, each with the cells around it.
+/// The most frequent differences, each with its neighbouring cells.
 std::vector<Eigen::Vector2d> frequent(const Cells& cells) {
   std::vector<std::pair<double, Eigen::Vector2d>> all;
   for (const auto& [at, cell] : cells) {

@@ -1,4 +1,4 @@
-// Places that look like themselves some metres on: rows of a plantation.
+// Self-similarity of places, as in the rows of a plantation.
 #pragma once
 
 #include <span>
@@ -8,9 +8,9 @@
 
 namespace understory::loop_closer {
 
-/// Decades of likelihood with which the stems of a place fit the place itself, shifted by 1 to
-/// 12 m: so much a wrong pose can show where stems stand in rows. 0 where no shift fits. Shifts
-/// tried are the most frequent differences between two stems. Cost: quadratic in the stems, some
+/// Decades of likelihood with which the stems of a place fit the same place shifted by 1 to 12 m:
+/// the evidence that a wrong pose can have in rows of stems. 0 if no shift fits. The shifts tested
+/// are the most frequent differences between two stems. Cost: quadratic in the stems, some
 /// milliseconds for 80.
 double self_likeness(std::span<const place_recognition::LevelStem> stems,
                      const place_recognition::StemNoise& noise);

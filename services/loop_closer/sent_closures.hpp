@@ -1,4 +1,4 @@
-// What was told to the mapper, and what it made of it.
+// Closures sent to the mapper, and its results.
 #pragma once
 
 #include <cstdint>
@@ -21,21 +21,21 @@ struct ClosurePaths {
   }
 };
 
-/// Remembers the latest closures that were sent, where the last one counted, and what was revoked.
+/// Keeps the latest closures sent, the path length of the last accepted one, and the revoked ones.
 class SentClosures {
  public:
-  /// Most that are remembered, of each kind.
+  /// Most closures kept, of each kind.
   static constexpr std::size_t kMost = 4096;
-  /// A closure that was revoked speaks against others so near at both ends [m of path].
+  /// A revoked closure blocks others within this distance at both ends [m of path].
   static constexpr double kRevokedM = 50.0;
 
   /// A closure was sent.
   void add(std::uint64_t id, const ClosurePaths& paths);
-  /// Whether it is one of ours that is remembered; then what became of it is noted.
+  /// Whether the closure is one of ours that is kept; then its result is recorded.
   bool note(const model::LoopResult& result);
-  /// Path at which a closure was accepted last [m]; far back where none was.
+  /// Path length at the last accepted closure [m]; a large negative value if there is none.
   double accepted_at_m() const { return accepted_at_m_; }
-  /// Whether somebody has revoked a closure between about these places.
+  /// Whether a closure between approximately these places was revoked.
   bool was_revoked(const ClosurePaths& paths) const;
 
   /// Members of a saved state; see common/state.

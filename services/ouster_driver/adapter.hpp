@@ -1,4 +1,4 @@
-// The Ouster driver between the network and the bus.
+// Connects the Ouster driver to the network and the bus.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ struct OusterDriverChannels {
 };
 
 /// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to
-/// start with a wrong configuration, and ends with status 1 where a port is taken.
+/// start with an invalid configuration, and ends with status 1 if a port is in use.
 bus::Service ouster_driver_service(const OusterDriverChannels& channels = {});
 
 }  // namespace understory::ouster_driver

@@ -1,4 +1,4 @@
-// The Ouster driver as a process. Its channels: OusterDriverChannels in adapter.hpp, and --help.
+// The Ouster driver's process. Its channels: OusterDriverChannels in adapter.hpp, and --help.
 #include "services/ouster_driver/adapter.hpp"
 
 int main(int argc, char** argv) {

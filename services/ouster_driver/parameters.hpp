@@ -8,18 +8,18 @@
 
 namespace understory::ouster_driver {
 
-/// UDP ports, as the sensor's `udp_port_lidar` and `udp_port_imu`; 0 = any free one.
+/// UDP ports, equal to the sensor's `udp_port_lidar` and `udp_port_imu`; 0 = any free one.
 struct OusterPortParameters {
   int lidar = packets::kOusterLidarPort;
   int imu = packets::kOusterImuPort;
 };
 
-/// Which sensor it is.
+/// The sensor's metadata.
 struct OusterSensorParameters {
-  std::string metadata_file;  ///< JSON, as the sensor gives it by HTTP.
+  std::string metadata_file;  ///< JSON, as received from the sensor by HTTP.
 };
 
-/// The IMU inside of the laser.
+/// The IMU inside the laser.
 struct OusterImuParameters {
   bool is_published = true;  ///< False: another unit on the vehicle gives RAW_IMU.
 };

@@ -23,12 +23,11 @@ using map_file::Fault;
 using map_file::MapFileError;
 
 constexpr model::Utime kSecond_us = 1'000'000;
-/// Message time from one question for the whole map to the next, and after a fault of the file
-/// until it is tried again.
+/// Message time between requests for the whole map, and between attempts after a fault of the file.
 constexpr model::Utime kAskAgain_us = 5 * kSecond_us;
 constexpr model::Utime kTryAgain_us = kSecond_us;
 constexpr int kWait_ms = 1000;
-/// A SUBMAP's keyframes and payload take so many times the room of its landmarks.
+/// A SUBMAP with its keyframes and payload is this many times larger than its landmarks.
 constexpr std::size_t kSubmapParts = 8;
 constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
@@ -50,7 +49,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     node.every(kSecond_us, [this](model::Utime now) { tick(now); });
   }
 
-  // The state that counts is the file's; this is what is not in it yet.
+  // The file has the state; this is the part not written yet.
   std::string save() const override { return stage_.save(); }
   void load(const std::string& state) override { stage_.load(state); }
 
@@ -79,7 +78,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
   int wait_ms() const override { return kWait_ms; }
 
  private:
-  // Nothing is journaled: what was missed comes with the next MAP, which is asked for.
+  // Nothing is journaled: missed changes are in the next MAP, which is requested.
 
   void subscribe_to_submaps(bus::Node& node) {
     const auto landmarks = static_cast<std::size_t>(parameters_.input.max_landmarks);
@@ -95,7 +94,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
         channels_.map_correction,
         [this](const model::MapCorrection& correction) { correct(correction); },
         {.journaled = false});
-    // Anybody may send one, with a stamp of another time.
+    // Any process may send one, with a stamp of another time.
     node.subscribe<model::LoopClosure>(channels_.loop_closure,
                                        [this](const model::LoopClosure& one) { stage_.take(one); },
                                        {.sequenced = false, .timed = false, .journaled = false});
@@ -123,7 +122,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
         {.queue_size = 500, .journaled = false});
   }
 
-  /// A message that no map can have must not keep the others from being written.
+  /// An invalid state must not prevent the others from being written.
   void take_existence(const model::ExistenceState& state) {
     const std::string fault = map_file::fault_of(state);
     if (fault.empty()) {
@@ -133,9 +132,9 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     }
   }
 
-  /// Works on the drive's file. What is wrong with it is told once, in HEALTH as long as it lasts,
-  /// and the drive goes on; false. A file that turns out to be damaged is passed over, and the work
-  /// is done in the next one.
+  /// Works on the drive's file. A fault is reported once, and stays in HEALTH as long as it lasts;
+  /// the drive continues; returns false. A damaged file is skipped, and the work is done in the
+  /// next one.
   template <class Work>
   bool with_file(model::Utime now, const std::string& channel, const Work& work) {
     if (next_try_ >= 0 && now >= 0 && now < next_try_ && now >= next_try_ - kTryAgain_us)
@@ -167,7 +166,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     }
   }
 
-  /// What the next file lacks is asked for.
+  /// Requests the data that the next file lacks.
   void tell_passed_over(model::Utime now, const std::string& channel) {
     for (const PassedOver& one : folder_->take_passed_over()) {
       node_->report(reason_of(one.fault), one.line, channel);
@@ -176,8 +175,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     }
   }
 
-  /// Whether the work is done all the same: what is wrong with one message is nothing wrong with
-  /// the file.
+  /// Whether the work counts as done: a fault of one message is no fault of the file.
   bool fail(const MapFileError& error, model::Utime now, const std::string& channel) {
     node_->report(reason_of(error.fault()), error.what(), channel);
     if (error.fault() == Fault::kRefused) return true;
@@ -192,13 +190,13 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     return false;
   }
 
-  /// Confirmed when it is on the device, and again whenever it comes again.
+  /// Confirms a submap when it is on the device, and again each time it arrives again.
   void keep(const model::Submap& submap) {
     bool is_kept = false;
     with_file(submap.utime, channels_.submap, [&](DriveFile& file) {
       map_file::Keeping kept = file.put(submap, stage_.pose_of(submap));
       if (kept == map_file::Keeping::kOther) {
-        // Another mapper's, or of one that was started anew.
+        // From another mapper, or one that was restarted.
         folder_->begin_drive();
         stage_.begin_drive();
         kept = folder_->at(submap.utime).put(submap, submap.map_T_submap);
@@ -302,8 +300,9 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
   StorageWatch watch_;
   std::filesystem::path state_directory_;
   std::unique_ptr<DriveFolder> folder_;
-  model::Utime next_try_ = -1;  ///< After a fault of the file; -1 = there was none.
-  model::Utime asked_ = -1;     ///< When the whole map was asked for.
+  model::Utime next_try_ =
+      -1;                    ///< Time of the next attempt after a fault of the file; -1: no fault.
+  model::Utime asked_ = -1;  ///< Time of the last request for the whole map.
   bus::Publisher<model::SubmapStored> stored_;
   bus::Publisher<model::Submap> replies_;
   bus::Publisher<map_request_t> requests_;

@@ -1,4 +1,4 @@
-// The store's place on the bus.
+// Connects the store to the bus.
 #pragma once
 
 #include <string>
@@ -25,9 +25,9 @@ struct StoreChannels {
   std::string map_request = all.out("MAP_REQUEST", "asks for MAP where changes were missed");
 };
 
-/// The store as a service: name, channels and what makes its adapter. The adapter is a bus::Device:
-/// only where it is opened does it write where the configuration says; else (replay, experiments)
-/// into a temporary folder.
+/// The store as a service: its name, its channels and the factory of its adapter. The adapter is a
+/// bus::Device: only after open() does it write to the configured folder; else (replay,
+/// experiments) to a temporary folder.
 bus::Service submap_store_service(const StoreChannels& channels = {});
 
 }  // namespace understory::submap_store

@@ -19,15 +19,15 @@ using map_file::Fault;
 using map_file::MapFileError;
 using Clock = std::chrono::steady_clock;
 
-/// Stamps of two messages of one drive may come so much out of order [us].
+/// Largest disorder of stamps of two messages of one drive [us].
 constexpr model::Utime kDisorder_us = 1'000'000;
-/// Submaps that are drawn between two looks at the clock.
+/// Submaps processed between two checks of the time.
 constexpr std::size_t kDrawnTogether = 20;
 
 constexpr const char* kSetAside = ".set-aside";
 
-/// Number in the name of a drive's file, also of one that was set aside: numbers are given once. 0
-/// for other files.
+/// Number in the name of a drive's file, also of a renamed one: numbers are never reused. 0 for
+/// other files.
 int number_in(const fs::path& file) {
   int number = 0;
   int end = 0;
@@ -37,17 +37,17 @@ int number_in(const fs::path& file) {
   return rest.empty() || rest.starts_with(kSetAside) ? std::max(number, 0) : 0;
 }
 
-/// Whether a drive goes on in another file. One that others have open, or for which there is no
-/// room, may be gone on in a second later.
+/// Whether a fault makes a drive continue in another file. A file that is open elsewhere, or
+/// without space on its device, may be usable a second later.
 bool is_passed_over(Fault fault) {
   return fault != Fault::kInUse && fault != Fault::kFull && fault != Fault::kRefused;
 }
 
-/// A map of other people keeps its name.
+/// A foreign map keeps its name.
 bool is_set_aside(Fault fault) { return fault == Fault::kDamaged || fault == Fault::kForeign; }
 
-/// Renames it together with what SQLite keeps beside it, the file itself last. Its name then: as it
-/// was where it cannot be renamed.
+/// Renames the file and its SQLite side files, the file itself last. Returns the new name; the old
+/// one if renaming fails.
 fs::path set_aside(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return file;
@@ -119,8 +119,8 @@ void DriveFolder::make_folder() const {
                        fmt::format("{}: cannot be made: {}", folder_.string(), error.message()));
 }
 
-/// Opens this drive's file, or the folder's last one where it may be; else false. One that is
-/// passed over has the next one open in its place.
+/// Opens this drive's file, or the folder's last one if permitted; else false. If it must be
+/// skipped, the next file is opened instead.
 bool DriveFolder::open_last(model::Utime utime) {
   const bool is_same_drive = number_.has_value();
   const int last = is_same_drive ? *number_ : last_number();
@@ -151,8 +151,8 @@ void DriveFolder::make_next() {
   number_ = number;
 }
 
-/// Nothing is given up before there is another file: a device that fails as a whole fails here,
-/// too, and then the drive goes on in its file as soon as it can.
+/// Skips a file only after another one exists: if the whole device fails, this fails too, and the
+/// drive continues in its file as soon as possible.
 void DriveFolder::pass_over(int number, const MapFileError& fault) {
   const auto own_number = std::exchange(number_, std::nullopt);
   try {
@@ -183,7 +183,7 @@ std::optional<model::Submap> DriveFolder::find_passed_over(const map_file::Subma
     try {
       if (auto found = map_file::submap_in(file, key)) return found;
     } catch (const MapFileError&) {
-      // Its fault was reported when it was passed over.
+      // Its fault was reported when it was skipped.
     }
   }
   return std::nullopt;
@@ -219,7 +219,7 @@ bool DriveFolder::finish() noexcept {
       is_sealed = true;
     }
   } catch (const std::exception&) {
-    // A full disk, say: what is open stays open.
+    // For example a full disk: the open file stays open.
   }
   file_.reset();
   return is_sealed;

@@ -13,49 +13,48 @@
 
 namespace understory::submap_store {
 
-/// A file that the drive does not go on in, and what became of it.
+/// A file in which the drive cannot continue, and its fault.
 struct PassedOver {
   map_file::Fault fault = map_file::Fault::kDamaged;
-  std::string line;  ///< For a person; names the file.
+  std::string line;  ///< For a person; contains the file's name.
 };
 
-/// A folder of files drive-0001.gpkg, drive-0002.gpkg and so on, of which the last one may be open.
-/// Everything throws map_file::MapFileError, whose one line names the file.
+/// A folder of files drive-0001.gpkg, drive-0002.gpkg and so on; at most the last one is open. All
+/// errors are map_file::MapFileError, with one line that contains the file's name.
 ///
-/// A file that cannot be gone on in is passed over: the drive goes on in the next number. What is
-/// damaged, or no map, is set aside under its name with `.set-aside` behind it, where it can be
-/// renamed; a map that cannot be written stays as it is. Nothing is deleted.
+/// A file that cannot be used is skipped: the drive continues in the next number. A damaged file,
+/// or one that is no map, is renamed with the suffix `.set-aside` if possible; a map that cannot be
+/// written stays as it is. Nothing is deleted.
 class DriveFolder {
  public:
-  /// In a folder that is made where it is not there.
+  /// Uses a folder, and creates it if it is missing.
   DriveFolder(std::filesystem::path folder, const FolderParameters& parameters);
-  /// In a folder of its own that is gone with this: for replay and experiments. Throws
-  /// std::runtime_error where none can be made.
+  /// Uses a temporary folder of its own, deleted by the destructor: for replay and experiments.
+  /// Throws std::runtime_error if it cannot be created.
   explicit DriveFolder(const FolderParameters& parameters);
   ~DriveFolder();
   DriveFolder(const DriveFolder&) = delete;
   DriveFolder& operator=(const DriveFolder&) = delete;
 
-  /// The file of the drive that a message with this stamp is of. Where none is open: the one that
-  /// was, or the folder's last one, where its drive may go on; else a new one. Throws where another
-  /// process has it, where there is no room, or where it is to be passed over and no other one can
-  /// be made: then the next call tries again.
+  /// The file of the drive of a message with this stamp. If none is open: the previous one, or the
+  /// folder's last one, if its drive may continue; else a new one. Throws if another process has it
+  /// open, if there is no space left, or if it must be skipped and no other one can be created:
+  /// then the next call tries again.
   map_file::DriveFile& at(model::Utime utime);
-  /// The files that were passed over since the last call.
+  /// The files skipped since the last call.
   std::vector<PassedOver> take_passed_over() { return std::exchange(passed_over_, {}); }
-  /// A submap from files of this drive that were passed over while it went on, as far as they can
-  /// be read.
+  /// A submap from files of this drive that were skipped during it, as far as they are readable.
   std::optional<model::Submap> find_passed_over(const map_file::SubmapKey& key) const;
-  /// The file that is open; null where none is.
+  /// The open file; null if none is open.
   map_file::DriveFile* current() { return file_.get(); }
-  /// Ends the drive of the file as finish() does; the next at() makes another one.
+  /// Ends the drive of the file like finish(); the next at() creates another one.
   void begin_drive();
-  /// Something is wrong with the file: closes it; the next at() opens it anew.
+  /// Closes the file after a fault; the next at() opens it again.
   void close() { file_.reset(); }
-  /// The file turned out to be damaged: closes it; the next at() passes it over.
+  /// Closes a damaged file; the next at() skips it.
   void give_up(const map_file::MapFileError& fault);
-  /// Seals the file, as far as that takes no longer than the parameters allow, and closes it. Never
-  /// throws: what is left is done by who opens the file next. False where something is left.
+  /// Seals the file, within the time that the parameters allow, and closes it. Never throws. False
+  /// if a part is left: the next process that opens the file completes it.
   bool finish() noexcept;
 
  private:
@@ -70,11 +69,12 @@ class DriveFolder {
   std::filesystem::path folder_;
   FolderParameters parameters_;
   bool is_temporary_ = false;
-  std::optional<int> number_;  ///< Of this drive's file.
+  std::optional<int> number_;  ///< Number of this drive's file.
   std::unique_ptr<map_file::DriveFile> file_;
-  std::optional<map_file::MapFileError> given_up_;  ///< Why this drive's file is not opened again.
-  std::vector<PassedOver> passed_over_;             ///< Not reported yet.
-  std::vector<std::filesystem::path> earlier_;  ///< Files of this drive that it went on without.
+  std::optional<map_file::MapFileError>
+      given_up_;                         ///< Reason why this drive's file is not opened again.
+  std::vector<PassedOver> passed_over_;  ///< Not reported yet.
+  std::vector<std::filesystem::path> earlier_;  ///< Skipped files of this drive.
 };
 
 }  // namespace understory::submap_store

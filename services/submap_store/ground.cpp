@@ -75,7 +75,7 @@ void Ground::put(const model::MapLandmark& landmark) {
   gone_.erase(landmark.id);
 }
 
-/// What is not in the file does not wait.
+/// A landmark that is not in the file does not wait.
 void Ground::move(const model::MapLandmark& landmark) {
   if (landmarks_.contains(landmark.id) || gone_.contains(landmark.id)) return put(landmark);
   moved_[landmark.id] = landmark;

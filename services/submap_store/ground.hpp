@@ -1,4 +1,4 @@
-// The map that the mapper holds itself, as far as it is not written yet.
+// The part of the map in the mapper's memory, as far as it is not written yet.
 #pragma once
 
 #include <cstdint>
@@ -23,34 +23,35 @@ void archive(Archive& a, Self& s) {
 
 namespace understory::submap_store {
 
-/// What MAP, MAP_DELTA and SLAM_UPDATE of one map say that is not written yet. Landmarks that
-/// MAP_DELTA moves wait until draw(): where a loop closes each keyframe moves all of them by some
-/// centimetres. Memory: O(what changed).
+/// Changes by MAP, MAP_DELTA and SLAM_UPDATE of one map that are not written yet. Landmarks that
+/// MAP_DELTA moves wait until draw(): while a loop closes, each keyframe moves all of them by some
+/// centimetres. Memory: O(changes).
 class Ground {
  public:
-  /// Of no map.
+  /// Without a map.
   Ground() = default;
-  /// Of the map with this number, from its beginning on.
+  /// For the map with this number, from its start.
   explicit Ground(std::uint32_t map_id) : map_id_(map_id) {}
 
   /// Number of the map; 0 = none yet.
   std::uint32_t map_id() const { return map_id_; }
-  /// Takes all that the mapper holds.
+  /// Sets all that the mapper has in memory.
   void take(const model::WholeMap& map);
-  /// Takes what changed. One with an older version is passed over.
+  /// Applies a change. One with an older version is skipped.
   void take(const model::MapDelta& delta);
-  /// Takes a keyframe that the map has accepted.
+  /// Adds a keyframe that the map has accepted.
   void take(const model::MapUpdate& update);
-  /// Its landmarks and keyframes are kept elsewhere.
+  /// Removes the landmarks and keyframes of a submap that was handed over.
   void hand_over(const model::Submap& submap);
 
-  /// So many landmarks that have moved wait no more: of all that wait each in its turn.
+  /// Releases up to `most` of the waiting landmarks, in rotation.
   void draw(std::size_t most);
-  /// What is to be written, without the landmarks that wait; none where there is nothing.
+  /// The changes to write, without the waiting landmarks; none if there are none.
   std::optional<map_file::GroundChange> change() const;
-  /// All of change() is written.
+  /// The result of change() is written completely.
   void written();
-  /// Changes were missed, or the map began before this did.
+  /// Whether the whole map must be requested: changes were missed, or the map began before this
+  /// object.
   bool wants_whole() const { return map_id_ != 0 && wants_whole_; }
   /// From now on changes may have been missed.
   void want_whole() { wants_whole_ = true; }
@@ -71,11 +72,12 @@ class Ground {
   model::Utime utime_ = 0;
   std::uint64_t version_ = 0;
   std::map<model::LandmarkId, model::MapLandmark> landmarks_;
-  std::map<model::LandmarkId, model::MapLandmark> moved_;  ///< They wait; the file has each.
-  model::LandmarkId next_moved_ = 0;                       ///< Whose turn it is, or the one after.
+  std::map<model::LandmarkId, model::MapLandmark>
+      moved_;                         ///< Waiting; the file has an older position of each.
+  model::LandmarkId next_moved_ = 0;  ///< The next landmark in rotation, or the one after.
   std::map<model::LandmarkId, bool> gone_;
   std::map<model::Utime, model::KeyframePose> keyframes_;
-  bool is_whole_ = false;  ///< `landmarks_` are all that the mapper holds.
+  bool is_whole_ = false;  ///< `landmarks_` are all that the mapper has in memory.
   bool wants_whole_ = false;
 };
 

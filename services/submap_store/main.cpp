@@ -1,4 +1,4 @@
-// The store as a process. Its channels: StoreChannels in adapter.hpp, and --help.
+// The store's process. Its channels: StoreChannels in adapter.hpp, and --help.
 #include "services/submap_store/adapter.hpp"
 
 int main(int argc, char** argv) {

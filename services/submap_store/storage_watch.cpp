@@ -3,7 +3,7 @@
 namespace understory::submap_store {
 namespace {
 
-/// Message time for which HEALTH has a file that was passed over.
+/// Message time for which HEALTH shows a skipped file.
 constexpr model::Utime kShown_us = 60'000'000;
 
 bus::WatchedCondition watched(wire::Reason reason, std::string_view text) {

@@ -1,4 +1,4 @@
-// What HEALTH says of the store's file.
+// HEALTH of the store's file.
 #pragma once
 
 #include <array>
@@ -10,29 +10,29 @@
 
 namespace understory::submap_store {
 
-/// The reason that HEALTH and LOG have for a fault of a file.
+/// Reason in HEALTH and LOG for a fault of a file.
 wire::Reason reason_of(map_file::Fault fault);
 
-/// One condition for each thing that can be wrong with a file. It holds from the first call that
-/// fails so until a call succeeds; where the drive goes on in the next file, for a minute. It is no
-/// part of a saved state: the file is looked at anew.
+/// One condition per kind of fault. It holds from the first failing call until a call succeeds; if
+/// the drive continues in the next file, for a minute. Not saved: the file is checked again after a
+/// restart.
 class StorageWatch {
  public:
-  /// All is well.
+  /// No condition is raised.
   StorageWatch();
 
   /// A call failed.
   void failed(map_file::Fault fault);
-  /// A file was passed over for its fault at this message time [us].
+  /// A file was skipped for its fault at this message time [us].
   void passed_over(map_file::Fault fault, model::Utime now);
   /// A call succeeded at this message time [us].
   void succeeded(model::Utime now);
-  /// What to show.
+  /// The conditions for HEALTH.
   const std::array<bus::WatchedCondition, 6>& conditions() const { return conditions_; }
 
  private:
   std::array<bus::WatchedCondition, 6> conditions_;
-  std::optional<wire::Reason> passed_over_;  ///< Of the file that was passed over last.
+  std::optional<wire::Reason> passed_over_;  ///< Of the last skipped file.
   model::Utime passed_over_at_ = 0;
 };
 

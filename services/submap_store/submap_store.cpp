@@ -10,12 +10,12 @@ namespace understory::submap_store {
 namespace {
 
 constexpr state::Format kFormat{"submap_store", 3};
-/// Closures that wait for the mapper's word.
+/// Most closures that wait for the mapper's result.
 constexpr std::size_t kMostProposed = 1000;
 constexpr std::size_t kWhole = std::numeric_limits<std::size_t>::max();
 
-/// Number of the map that landmarks are of; 0 where there are none. Earlier maps, with lower
-/// numbers, may have become part of it.
+/// Number of the landmarks' map; 0 without landmarks. Earlier maps, with lower numbers, may have
+/// become part of it.
 std::uint32_t map_of(const std::vector<model::MapLandmark>& landmarks) {
   std::uint32_t result = 0;
   for (const model::MapLandmark& one : landmarks) result = std::max(result, model::map_of(one.id));
@@ -35,7 +35,7 @@ void SubmapStore::take(const model::WholeMap& map) {
 }
 
 void SubmapStore::take(const model::MapDelta& delta) {
-  // Only the first change of a map may come before anything else that names it.
+  // Only the first change of a map may arrive before any other message of it.
   if (delta.base_version == 0) go_to(map_of(delta.added));
   if (ground_.map_id() == 0) return;
   ground_.take(delta);
@@ -134,8 +134,7 @@ void SubmapStore::load(const std::string& state) {
   ground_.want_whole();
 }
 
-/// The map that is left is written for the last time; one that few keyframes agreed with is given
-/// up.
+/// Writes the map before for the last time; a map with few agreeing keyframes is deleted.
 void SubmapStore::go_to(std::uint32_t map_id) {
   if (map_id == 0 || map_id == ground_.map_id()) return;
   ground_.draw(kWhole);
@@ -150,7 +149,7 @@ void SubmapStore::go_to(std::uint32_t map_id) {
   proposed_.clear();
 }
 
-/// Landmarks that are no more, and those that are another one now: the tracker has fused the two.
+/// Removed landmarks, and merged ones: the tracker has fused the two.
 void SubmapStore::forget(const model::MapDelta& delta) {
   const auto found = existence_.find(ground_.map_id());
   if (found == existence_.end()) return;

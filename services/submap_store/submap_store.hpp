@@ -1,4 +1,4 @@
-// The store without its file: what of the mapper's messages is to be written, and when.
+// The store without its file: selects the data to write from the mapper's messages.
 #pragma once
 
 #include <cstdint>
@@ -16,15 +16,15 @@
 
 namespace understory::submap_store {
 
-/// What is to be written, in this order.
+/// Data to write, in this order.
 struct Writes {
-  std::vector<std::uint32_t> dropped_maps;     ///< Young maps that were given up.
-  std::vector<map_file::GroundChange> ground;  ///< Of maps that are not in use any more, and of it.
-  std::vector<model::LoopClosure> closures;    ///< They count; or they were taken back.
-  /// What the existence tracker goes on with, by map.
+  std::vector<std::uint32_t> dropped_maps;     ///< Provisional maps that were deleted.
+  std::vector<map_file::GroundChange> ground;  ///< Of earlier maps, then of the map in use.
+  std::vector<model::LoopClosure> closures;    ///< Accepted or revoked.
+  /// States from which the existence tracker continues, by map.
   std::vector<std::pair<std::uint32_t, map_file::StoredExistence>> existence;
 
-  /// Whether there is nothing.
+  /// Whether there is nothing to write.
   bool empty() const {
     return dropped_maps.empty() && ground.empty() && closures.empty() && existence.empty();
   }
@@ -36,17 +36,17 @@ struct Writes {
   }
 };
 
-/// Follows the mapper. Submaps go to the file at once and are no business of this class, but for
-/// what they take out of the ground: the map that the mapper holds itself. The ground is written
-/// now and then, so that the file has all of a drive. Memory: what has changed since it was written
-/// last (of existence: one state for each landmark), and a pose for each submap.
+/// Follows the mapper. Submaps are written to the file at once; this class only removes their
+/// content from the ground: the part of the map in the mapper's memory. The ground is written
+/// periodically, so the file contains the whole drive. Memory: changes since the last write (of
+/// existence: one state per landmark), and a pose per submap.
 class SubmapStore {
  public:
-  /// Whether this keyframe begins a map that a file with maps up to `highest_map` has already: the
-  /// mapper was started anew, and so is the drive.
+  /// Whether this keyframe begins a map that a file with maps up to `highest_map` already has: then
+  /// the mapper was restarted, and a new drive begins.
   static bool begins_drive(const model::MapUpdate& update, std::uint32_t highest_map);
 
-  /// MAP. One that is cut to bounds is passed over.
+  /// MAP. One that is cut to bounds is skipped.
   void take(const model::WholeMap& map);
   /// MAP_DELTA.
   void take(const model::MapDelta& delta);
@@ -54,37 +54,36 @@ class SubmapStore {
   void take(const model::MapUpdate& update);
   /// MAP_CORRECTION.
   void take(const model::MapCorrection& correction);
-  /// LOOP_CLOSURE: remembered until the mapper says what became of it.
+  /// LOOP_CLOSURE: kept until the mapper's result arrives.
   void take(const model::LoopClosure& closure);
   /// LOOP_RESULT.
   void take(const model::LoopResult& result);
-  /// EXISTENCE_STATE, in which map_file::fault_of() finds nothing. That of a map which the mapper
-  /// has not begun yet waits until it has.
+  /// EXISTENCE_STATE that passed map_file::fault_of(). A state of a map that the mapper has not
+  /// begun yet waits for the map.
   void take(const model::ExistenceState& state);
 
-  /// Where a submap is: its own pose, or that of a later correction.
+  /// Pose of a submap: its own, or that of a later correction.
   geometry::SE2 pose_of(const model::Submap& submap) const;
-  /// A submap is in the file: its landmarks and keyframes are not the ground's any more.
+  /// A submap is in the file: its landmarks and keyframes leave the ground.
   void stored(const model::Submap& submap);
-  /// The file is another one, without anything in it: the ground must be written whole.
+  /// Starts with a new, empty file: the ground must be written as a whole.
   void begin_drive();
 
-  /// The drive goes on in another file: the ground must be written whole.
+  /// Continues the drive in another file: the ground must be written as a whole.
   void begin_file() { ground_.want_whole(); }
 
-  /// So many landmarks of the ground that have moved are due, of all that wait each in its turn.
+  /// Makes up to `most` waiting landmarks of the ground due, in rotation.
   void draw_moved(std::size_t most) { ground_.draw(most); }
-  /// What is to be written, without the landmarks of the ground that have moved and wait.
+  /// The data to write, without waiting landmarks of the ground.
   Writes due() const;
   /// All of due() is in the file.
   void written();
-  /// Whether the ground is not known as a whole: changes were missed, or the store began later than
-  /// the mapper.
+  /// Whether the ground is incomplete: changes were missed, or the store started after the mapper.
   bool wants_whole() const { return ground_.wants_whole(); }
 
   /// The state as bytes.
   std::string save() const;
-  /// Goes on with what save() gave; asks for the whole ground, since messages may have been missed.
+  /// Continues from a saved state; requests the whole ground, since messages may have been missed.
   /// Throws std::invalid_argument.
   void load(const std::string& state);
 
@@ -93,10 +92,10 @@ class SubmapStore {
   void forget(const model::MapDelta& delta);
 
   Ground ground_;
-  bool is_provisional_ = false;                           ///< The map in use, by its last keyframe.
-  Writes left_;                                           ///< But for the map in use.
-  std::optional<model::MapCorrection> correction_;        ///< The newest one.
-  std::map<std::uint64_t, model::LoopClosure> proposed_;  ///< By id; of the map in use.
+  bool is_provisional_ = false;                     ///< Of the map in use, by its last keyframe.
+  Writes left_;                                     ///< Of all maps but the one in use.
+  std::optional<model::MapCorrection> correction_;  ///< The newest.
+  std::map<std::uint64_t, model::LoopClosure> proposed_;          ///< By id; of the map in use.
   std::map<std::uint32_t, map_file::NewestExistence> existence_;  ///< Not written yet, by map.
 };
 

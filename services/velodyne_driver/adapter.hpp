@@ -1,4 +1,4 @@
-// The Velodyne driver between the network and the bus.
+// Connects the Velodyne driver to the network and the bus.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ struct VelodyneDriverChannels {
 };
 
 /// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to
-/// start with a wrong configuration, and ends with status 1 where a port is taken.
+/// start with an invalid configuration, and ends with status 1 if a port is in use.
 bus::Service velodyne_driver_service(const VelodyneDriverChannels& channels = {});
 
 }  // namespace understory::velodyne_driver

@@ -1,5 +1,4 @@
-// The Velodyne driver as a process. Its channels: VelodyneDriverChannels in adapter.hpp, and
-// --help.
+// The Velodyne driver's process. Its channels: VelodyneDriverChannels in adapter.hpp, and --help.
 #include "services/velodyne_driver/adapter.hpp"
 
 int main(int argc, char** argv) {

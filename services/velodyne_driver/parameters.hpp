@@ -8,22 +8,22 @@
 
 namespace understory::velodyne_driver {
 
-/// UDP ports; 0 = any free one, LOG says which.
+/// UDP ports; 0 = any free one, reported in LOG.
 struct VelodynePortParameters {
   int data = io::kVelodyneDataPort;
   int position = io::kVelodynePositionPort;
 };
 
-/// Which sensor it is.
+/// The sensor's model and calibration.
 struct VelodyneSensorParameters {
   std::string model = "vlp16";   ///< "vlp16", "vlp32c", "hdl32e" or "hdl64e".
   std::string calibration_file;  ///< The HDL-64E's own XML or YAML.
 };
 
-/// Fixes of the receiver at the sensor.
+/// Fixes of the GNSS receiver at the sensor.
 struct VelodyneGnssParameters {
   bool is_published = true;  ///< False: another receiver gives RAW_GNSS.
-  bool has_origin = false;   ///< Else metres count from the first fix since the start.
+  bool has_origin = false;   ///< False: the origin is the first fix since the start.
   double origin_latitude_deg = 0.0;
   double origin_longitude_deg = 0.0;
 };

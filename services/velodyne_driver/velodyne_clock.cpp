@@ -7,10 +7,10 @@ namespace understory::velodyne_driver {
 namespace {
 
 constexpr model::Utime kHour_us = 3'600'000'000;
-/// Sensor's and computer's clock may differ so much in what passed between two packets.
+/// Largest difference between the sensor's and the computer's time from one packet to the next.
 constexpr model::Utime kLargestMismatch_us = 1'000'000;
 
-/// The difference that is nearest to zero.
+/// The difference modulo an hour, nearest to zero.
 model::Utime hour_difference(std::uint32_t from, std::uint32_t to) {
   const model::Utime difference =
       (static_cast<model::Utime>(to) - static_cast<model::Utime>(from)) % kHour_us;
@@ -33,14 +33,14 @@ VelodyneClock::Reading VelodyneClock::take(std::uint32_t past_hour_us, model::Ut
     has_started_ = true;
     put_into_hour(past_hour_us, received);
   } else {
-    // Both clocks should have advanced alike.
+    // Both clocks should have advanced by the same time.
     const model::Utime passed = received - received_;
     model::Utime delta = hour_difference(past_hour_us_, past_hour_us);
     if (std::abs(delta - passed) <= kLargestMismatch_us) {
       if (delta < 0 && delta >= -kLargestDisorder_us) return {Step::kLate, utime_ + delta};
       utime_ += delta;
     } else {
-      // Silent for more than half an hour, or one of the clocks was set.
+      // The sensor was silent for more than half an hour, or one of the clocks was set.
       const model::Utime before = utime_;
       put_into_hour(past_hour_us, received);
       delta = utime_ - before;

@@ -9,11 +9,12 @@
 
 namespace understory::velodyne_driver {
 
-/// The first packet's time is put into the hour that brings it nearest to its reception; from then
-/// on differences are added, so that a sensor half an hour off never changes the hour in between.
+/// The first packet's time is put into the hour in which it is nearest to its reception; from then
+/// on differences are added, so an offset of the sensor's clock of half an hour never changes the
+/// hour during a run.
 class VelodyneClock {
  public:
-  /// How a packet's time follows that of the one before.
+  /// Relation of a packet's time to the previous packet's.
   enum class Step : std::uint8_t {
     kNext,  ///< In order.
     kGap,   ///< More time has passed than between two packets.
@@ -25,14 +26,15 @@ class VelodyneClock {
     Step step = Step::kNext;
     model::Utime utime = 0;  ///< By the sensor's clock.
   };
-  /// Takes a packet's time [us past the hour] and when it was received by the computer's clock.
+  /// Adds a packet's time [us past the hour] and its reception time by the computer's clock.
   Reading take(std::uint32_t past_hour_us, model::Utime received);
-  /// How far the computer's clock is ahead of the sensor's: the least (the least delayed packet) of
+  /// Offset of the computer's clock minus the sensor's: the least (of the least delayed packet) in
   /// the last ten to twenty seconds [us]; none before the first packet.
   std::optional<model::Utime> offset_us() const { return delay_.offset_us(); }
 
-  static constexpr model::Utime kLargestGap_us = 50000;       ///< More is kGap.
-  static constexpr model::Utime kLargestDisorder_us = 20000;  ///< Less, back in time, is kLate.
+  static constexpr model::Utime kLargestGap_us = 50000;  ///< A longer one is kGap.
+  static constexpr model::Utime kLargestDisorder_us =
+      20000;  ///< A shorter one, back in time, is kLate.
 
  private:
   void put_into_hour(std::uint32_t past_hour_us, model::Utime received);

@@ -58,7 +58,7 @@ bool VelodyneDriver::refuse(std::span<const std::uint8_t> packet, std::size_t si
 }
 
 void VelodyneDriver::start_over() {
-  // Sweeps that were begun are numbered, too: no number must come twice.
+  // Incomplete sweeps are numbered, too: numbers must be unique.
   next_revolution_ += decoder_.counts().turns + 1;
   decoder_ = io::VelodyneDecoder(calibration_, parameters_.range.max_range_m);
   holes_reported_ = 0;
@@ -80,7 +80,7 @@ lidar_driver::DriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t
   output.is_refused = refuse(packet, size, output.faults);
   if (output.is_refused) return output;
 
-  // Does its time follow?
+  // Does its time continue the previous one?
   const VelodyneClock::Reading time = clock_.take(io::velodyne_packet_time_us(packet), received);
   switch (time.step) {
     case VelodyneClock::Step::kNext:

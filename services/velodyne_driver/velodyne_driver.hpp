@@ -1,12 +1,11 @@
-// The Velodyne driver's stage: packets in, sweeps and fixes out, and what is wrong with the
-// packets.
+// The Velodyne driver's stage: packets in, sweeps, fixes and packet faults out.
 //
 // Stamps: a sweep's utime is that of its first point, point times count from it. With time source
-// "sensor" it is the sensor's own clock (microseconds past the hour) in the hour that was nearest
-// when the first packet came, as the import of captures has it: right where the sensor is set by
-// PPS and NMEA. With "received" the offset between the clocks, by the packets that were least
-// delayed, is added: for a sensor without GNSS; late by the time that a packet needs (some tenths
-// of a millisecond). Fixes have the time at which their packet came.
+// "sensor" it is the sensor's own clock (microseconds past the hour), in the hour that is nearest
+// to the reception of the first packet, as in the import of captures: correct if PPS and NMEA set
+// the sensor's clock. With "received" the offset between the clocks, from the least delayed
+// packets, is added: for a sensor without GNSS; late by the delay of a packet (some tenths of a
+// millisecond). Fixes have the reception time of their packet.
 #pragma once
 
 #include <cstdint>
@@ -26,59 +25,59 @@
 
 namespace understory::velodyne_driver {
 
-/// What became of the packets since the start.
+/// Packet counts since the start.
 struct VelodyneDriverCounts {
-  std::uint64_t data_packets = 0;  ///< All that came to the data port.
+  std::uint64_t data_packets = 0;  ///< All received at the data port.
   std::uint64_t wrong_size = 0;
   std::uint64_t wrong_model = 0;       ///< Of a sensor of another model.
   std::uint64_t damaged = 0;           ///< Impossible flags or azimuths.
   std::uint64_t late = 0;              ///< Out of order by less than 20 ms.
-  std::uint64_t gaps = 0;              ///< In time: the sweep in progress was left out.
-  std::uint64_t jumps = 0;             ///< Of the sensor's clock: the same.
-  std::uint64_t holes = 0;             ///< Sweeps from which packets are missing.
-  std::uint64_t sweeps = 0;            ///< Given out.
-  std::uint64_t position_packets = 0;  ///< All that came to the position port.
-  std::uint64_t bad_positions = 0;     ///< No sentence, or a wrong checksum.
-  std::uint64_t fixes = 0;             ///< Given out.
+  std::uint64_t gaps = 0;              ///< Gaps in time: the sweep in progress was discarded.
+  std::uint64_t jumps = 0;             ///< Jumps of the sensor's clock: likewise.
+  std::uint64_t holes = 0;             ///< Sweeps with missing packets.
+  std::uint64_t sweeps = 0;            ///< Published.
+  std::uint64_t position_packets = 0;  ///< All received at the position port.
+  std::uint64_t bad_positions = 0;     ///< No NMEA sentence, or a wrong checksum.
+  std::uint64_t fixes = 0;             ///< Published.
 
-  /// Data packets that were not used.
+  /// Number of data packets that were not used.
   std::uint64_t refused() const { return wrong_size + wrong_model + damaged + late; }
 };
 
-/// Decodes packets, assembles them to sweeps and stamps these. No state outlives a restart: a sweep
-/// that is in progress is lost, as on a real sensor that was off.
+/// Decodes packets, assembles sweeps and stamps them. No state survives a restart: a sweep in
+/// progress is lost, as when a real sensor was off.
 class VelodyneDriver {
  public:
   /// `calibration`: of the model in `parameters.sensor`.
   VelodyneDriver(const VelodyneDriverParameters& parameters, io::VelodyneCalibration calibration);
 
-  /// Takes a packet of the data port (0) or of the position port (1).
+  /// Adds a packet of the data port (0) or of the position port (1).
   lidar_driver::DriverOutput add(std::size_t port, std::span<const std::uint8_t> packet,
                                  std::size_t size, model::Utime received) {
     return port == 0 ? add_data(packet, size, received) : add_position(packet, size, received);
   }
-  /// Takes a data packet. `size`: of the packet as sent, where `packet` holds only its begin.
+  /// Adds a data packet. `size`: of the packet as sent, if `packet` holds only its beginning.
   /// `received`: by the computer's clock [us].
   lidar_driver::DriverOutput add_data(std::span<const std::uint8_t> packet, std::size_t size,
                                       model::Utime received);
-  /// Takes a position packet; parameters as above.
+  /// Adds a position packet; parameters as above.
   lidar_driver::DriverOutput add_position(std::span<const std::uint8_t> packet, std::size_t size,
                                           model::Utime received);
-  /// The sweep in progress, where it is almost whole.
+  /// The sweep in progress, if it is almost complete.
   std::optional<model::PointSweep> finish();
 
   const VelodyneDriverCounts& counts() const { return counts_; }  ///< Since the start.
   /// The counts, for LOG.
   std::string summary(const lidar_driver::SocketCounts& sockets) const;
-  /// How far the computer's clock is ahead of the sensor's [us].
+  /// Offset of the computer's clock minus the sensor's [us].
   std::optional<model::Utime> clock_offset_us() const { return clock_.offset_us(); }
-  /// What is wrong with the sensor's clock now, if anything is.
+  /// Present fault of the sensor's clock, if any.
   std::optional<wire::Refusal> clock_fault() const;
 
  private:
   bool refuse(std::span<const std::uint8_t> packet, std::size_t size,
               std::vector<wire::Refusal>& faults);
-  /// Leaves out the sweep in progress: what comes is not its continuation.
+  /// Discards the sweep in progress: the next packet does not continue it.
   void start_over();
   std::optional<model::PointSweep> stamped(std::optional<model::PointSweep> sweep);
 

@@ -60,7 +60,7 @@ bool Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
 bool Submaps::look_around(const model::FieldOfView& field_of_view, NodeIndex newest,
                           GlobalMap& map) {
   const Eigen::Vector2d vehicle_m = map.graph.pose(newest).translation();
-  // As far as PassJoiner looks for an earlier pass, and what was seen from there.
+  // Search range of PassJoiner for earlier passes, plus the sensor range there.
   const double range_m = field_of_view.max_range_m;
   const double reach_m =
       std::min(kFurthestPass_m, kReachOfPasses_sigmas * sigma_of(newest, map.graph)) +
@@ -89,7 +89,7 @@ bool Submaps::look_around(const model::FieldOfView& field_of_view, NodeIndex new
   return false;
 }
 
-/// One that does not come, since no store has it, holds up no other.
+/// A submap that does not arrive, since no store has it, does not delay others.
 bool Submaps::ask_for_next() {
   if (coming_.empty()) return false;
   wanted_.push_back(coming_.front());
@@ -99,7 +99,7 @@ bool Submaps::ask_for_next() {
 
 bool Submaps::give_next_away(NodeIndex newest, model::Utime utime, GlobalMap& map) {
   if (!may_hand_over_ || !far_m_) return false;
-  // Whole submaps only: where none of what the node observed is in the solved graph.
+  // Only whole submaps: no observation of the node is in the solved graph.
   const Eigen::Vector2d vehicle_m = map.graph.pose(newest).translation();
   const auto next = std::ranges::find_if(here_, [&](const Here& here) {
     return (map.graph.pose(here.node).translation() - vehicle_m).norm() > *far_m_ &&
@@ -108,10 +108,10 @@ bool Submaps::give_next_away(NodeIndex newest, model::Utime utime, GlobalMap& ma
   if (next == here_.end()) return false;
   map.graph.checkpoint();
   give_away(Here(*next), utime, map);
-  return true;  // What it tells is in the graph as before.
+  return true;  // Its information is in the graph as before.
 }
 
-/// The first node is in no stretch: far behind it is a submap of its own.
+/// The first node is in no stretch: far behind the vehicle it becomes a submap of its own.
 void Submaps::close_origin(const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
   const auto origin = map.graph.origin();
   if (!origin || map.graph.node(*origin).is_condensed) return;
@@ -120,8 +120,8 @@ void Submaps::close_origin(const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
   here_.push_back({*origin, std::nullopt});
 }
 
-/// The solved graph is that of the ground around the vehicle: its cost does not grow with the way.
-/// True where it solved.
+/// Limits the solved graph to the map around the vehicle: its cost does not grow with the path.
+/// True if it solved.
 bool Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
   std::vector<NodeIndex> far;
   std::vector<NodeIndex> near;
@@ -135,7 +135,7 @@ bool Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap
 
   map.graph.checkpoint();
   if (!near.empty()) {
-    // And what is about to come near.
+    // Thaws nodes that the vehicle approaches.
     for (const Away& away : away_) {
       const double distance_m = (map.graph.pose(away.node).translation() - vehicle_m).norm();
       if (distance_m < reach_m + 2.0 * kThawedBeyond_m) near.push_back(away.node);
@@ -145,7 +145,7 @@ bool Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap
     unfreezable_ = map.graph.freeze(far) ? 0 : far.size();
     if (unfreezable_ > 0) return false;
   }
-  (void)map.graph.solve();  // What they tell is in the graph as before.
+  (void)map.graph.solve();  // Their information is in the graph as before.
   map.adopt_estimates();
   return true;
 }
@@ -158,7 +158,7 @@ void Submaps::give_away(const Here& here, model::Utime utime, GlobalMap& map) {
   submap.map_T_submap = map.graph.pose(here.node);
   if (here.was) submap.replaced.push_back(*here.was);
 
-  // What others read.
+  // The part that other processes read.
   const geometry::SE2 submap_T_map = submap.map_T_submap.inverse();
   std::vector<model::LandmarkId> ids;
   for (const model::LandmarkId id : map.graph.dormant_of(here.node))
@@ -169,7 +169,7 @@ void Submaps::give_away(const Here& here, model::Utime utime, GlobalMap& map) {
     out.position_m = submap_T_map * out.position_m;
   }
 
-  // Out of the map.
+  // Removes it from the map.
   SubmapContent content;
   content.node = here.node;
   content.motions = map.graph.motions_of(here.node);
@@ -214,7 +214,7 @@ std::string Submaps::bring_back(const model::Submap& submap, GlobalMap& map) {
     for (const auto& observed : content.observed)
       for (const DormantObservation& one : observed) nodes.push_back(one.node);
     if (map.graph.thaw(nodes)) {
-      (void)map.graph.solve();  // Alone, as always where many variables come back.
+      (void)map.graph.solve();  // Alone, as always when many variables return.
       map.adopt_estimates();
       map.graph.checkpoint();
     }

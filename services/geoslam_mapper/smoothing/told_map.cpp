@@ -5,8 +5,8 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Of landmarks that are not in the solved graph: by the nodes that observed them last. Zero for
-/// the others.
+/// Covariances of landmarks outside the solved graph, from the nodes that observed them last. Zero
+/// for the others.
 std::vector<Eigen::Matrix2d> by_their_nodes(std::span<const model::LandmarkId> ids,
                                             std::span<const Eigen::Matrix2d> marginals,
                                             const GlobalMap& map) {

@@ -10,10 +10,9 @@ namespace {
 
 /// Two bases of a node are one viewpoint within this share of the folding distance and angle.
 constexpr double kApartShare = 0.25;
-/// Bases that are forgotten at a time.
+/// Number of bases deleted at a time.
 constexpr std::size_t kForgotten = 256;
-/// Most tears that are remembered; only those of the last keyframes matter, and those around a
-/// place that is found again.
+/// Most tears that are kept; only those of the last keyframes and around a revisited place matter.
 constexpr std::size_t kMostTears = 1024;
 
 }  // namespace
@@ -50,7 +49,7 @@ void Trajectory::add_spare(Base base) {
   forget_oldest();
 }
 
-/// Many at a time, where there are too many.
+/// Beyond the limit, deletes many at a time.
 void Trajectory::forget_oldest() {
   if (spare_ < kMostSpare + kForgotten) return;
   std::size_t forgotten = 0;
@@ -95,7 +94,7 @@ std::span<const std::uint32_t> Trajectory::viewpoints_of(NodeIndex node) const {
   return found->second.viewpoints;
 }
 
-/// They are no more the node's.
+/// Removes them from the node.
 std::vector<std::uint32_t> Trajectory::take_viewpoints_of(NodeIndex node) {
   const auto found = indexed_.find(node);
   if (found == indexed_.end()) return {};
@@ -104,7 +103,7 @@ std::vector<std::uint32_t> Trajectory::take_viewpoints_of(NodeIndex node) {
   return numbers;
 }
 
-/// Their numbers serve others.
+/// Their numbers are reused.
 void Trajectory::drop_viewpoints(NodeIndex node) {
   for (const std::uint32_t viewpoint : take_viewpoints_of(node)) {
     grid_.remove(viewpoint);
@@ -301,7 +300,7 @@ void Trajectory::rebuild_index(const PoseGraph& graph) {
   grid_ = {};
   spare_ = 0;
   for (const Base& base : bases_) {
-    (void)graph.node(base.node);  // Throws where the graph has no such node.
+    (void)graph.node(base.node);  // Throws if the graph has no such node.
     if (base.is_spare) ++spare_;
   }
   for (std::uint32_t number = 0; number < viewpoints_.size(); ++number) {

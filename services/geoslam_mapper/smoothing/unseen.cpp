@@ -7,13 +7,13 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Scans are this far from the keyframe's centre at most, and landmarks from their place in the
-/// index.
+/// Largest distance of a scan from the keyframe's centre plus that of a landmark from its index
+/// position.
 constexpr double kViewSlack_m = 5.0;
 
 bool is_of_first_keyframe(const StoredLandmark& landmark) { return landmark.last_keyframe == 1; }
 
-/// A landmark that the node observed and that stays.
+/// A landmark that the node observed and that stays in the map.
 std::optional<model::LandmarkId> lasting_of(NodeIndex node, const GlobalMap& map) {
   for (const auto& [id, observation] : map.graph.node(node).observations())
     if (!is_of_first_keyframe(map.landmarks.at(id))) return id;
@@ -77,7 +77,7 @@ std::vector<model::LandmarkId> drop_unseen(const model::FieldOfView& view, Globa
     if (is_unseen(landmark)) unseen.push_back(id);
   if (unseen.empty()) return unseen;
 
-  // The node observed one that stays, too: what is handed over to that does not count there.
+  // The observations move to a landmark that the node observed, too: there they are ignored.
   const std::vector<NodeIndex> nodes = map.landmarks.at(unseen.front()).nodes;
   const auto lasting = lasting_of(nodes.front(), map);
   if (!lasting) return {};

@@ -8,11 +8,11 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Change of speed within a step of odometry [m/s^2]: its mean is not the speed at its end.
+/// Change of speed within a step of odometry [m/s^2]: the mean speed differs from that at the end.
 constexpr double kAcceleration_mps2 = 2.0;
-/// Of the velocity of a stationary vehicle [m/s].
+/// Sigma of the velocity of a stationary vehicle [m/s].
 constexpr double kStandstill_mps = 0.01;
-/// chi^2 with three degrees of freedom that one in 10,000 exceeds.
+/// chi^2 with three degrees of freedom that is exceeded once in 10,000.
 constexpr double kGate = 21.1;
 /// A millimetre, a milliradian: landmarks have errors that all scans of a place share.
 constexpr double kLeastVariance = 1e-6;
@@ -23,7 +23,7 @@ Eigen::Matrix2d isotropic(double sigma) { return square(sigma) * Eigen::Matrix2d
 
 }  // namespace
 
-/// Odometry's mean velocity, or none; a bias that is known stays.
+/// Starts with odometry's mean velocity, or none; a known bias stays.
 void VelocityTrack::start_with(const geometry::SE2WithCovariance& step,
                                const model::InertialMotion& inertial) {
   VelocityState start;
@@ -45,8 +45,8 @@ void VelocityTrack::start_with(const geometry::SE2WithCovariance& step,
   now_ = start;
 }
 
-/// Velocity and bias by what odometry says of the step that follows, and the last pose by what
-/// their errors have in common.
+/// Updates velocity and bias with odometry's motion in the next step, and the last pose by its
+/// correlation with them.
 void VelocityTrack::learn_from(const geometry::SE2WithCovariance& step,
                                const model::Preintegration& z,
                                geometry::SE2WithCovariance& map_T_last) {
@@ -108,7 +108,7 @@ void VelocityTrack::carry_on(const geometry::SE2WithCovariance& step,
   const geometry::SE2 last_T_next(t * velocity + z.position_m + position_by_bias * bias,
                                   step.mean.theta());
 
-  // How errors go on: of the pose, of velocity and bias, and of them in the pose.
+  // Propagation of the errors: of the pose, of velocity and bias, and of their correlation.
   const Eigen::Matrix3d carried = last_T_next.inverse().Adjoint();
   Eigen::Matrix4d own = Eigen::Matrix4d::Identity();
   own.topLeftCorner<2, 2>() = back;
@@ -152,7 +152,7 @@ bool VelocityTrack::update(const geometry::SE2WithCovariance& map_T_scan) {
     return false;
   }
 
-  // What the pose's correction tells of them, by what their errors had in common.
+  // Update of velocity and bias from the pose's correction, by their correlation.
   const Eigen::Matrix<double, 3, 4> gain = predicted_.covariance.llt().solve(now_->with_pose);
   now_->mean += gain.transpose() * correction;
   now_->covariance -= gain.transpose() * learned * gain;

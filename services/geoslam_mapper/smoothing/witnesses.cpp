@@ -7,7 +7,8 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Path [m] on which one closure takes landmarks, at most: the longest window of the loop closer.
+/// Longest path [m] over which one closure collects landmarks: the longest window of the loop
+/// closer.
 constexpr double kWindow_m = 20.0;
 constexpr double kMostDecades = 12.0;
 constexpr double kUnstatedDecades = 8.0;
@@ -22,7 +23,7 @@ bool share_landmarks(const Witness& one, const Witness& other) {
          std::abs(one.to_m - other.to_m) < kWindow_m;
 }
 
-/// Extends `set` by members of `candidates`, all of which agree with all of it.
+/// Extends `set` by members of `candidates`; each candidate agrees with the whole set.
 void grow(std::span<const std::uint64_t> agrees, std::uint64_t set, std::uint64_t candidates,
           std::uint64_t& best) {
   if (std::popcount(set) > std::popcount(best)) best = set;
