@@ -9,7 +9,7 @@
 namespace understory::ekf {
 namespace {
 
-/// The landmark that observation `k` begins.
+/// The new landmark of observation `k`.
 MapLandmark new_landmark(const ScanUpdate& update, std::size_t k,
                          const model::Detection& detection) {
   MapLandmark landmark;
@@ -25,9 +25,9 @@ MapLandmark new_landmark(const ScanUpdate& update, std::size_t k,
 
 }  // namespace
 
-/// The correlated part counts as white noise of the power that it has over many scans: its variance
-/// times (1 + r) / (1 - r), with a correlation r from scan to scan. While the vehicle is stationary
-/// it does not count (StationaryMonitor::leave_place()).
+/// The correlated part is modelled as white noise of the same power over many scans: its variance
+/// times (1 + r) / (1 - r), with the correlation r from scan to scan. While the vehicle is
+/// stationary it is not added (StationaryMonitor::leave_place()).
 void ActiveMap::weaken(const Pairing& pairing, double distance_m, FilterState& state,
                        ScanUpdate& update) const {
   MapLandmark& landmark = state.landmark(pairing.landmark);
@@ -120,8 +120,8 @@ bool ActiveMap::is_near_old(const FilterState& state, const Eigen::Vector2d& pos
   });
 }
 
-/// True if a landmark may be added. One that this scan observed does not make room for another one
-/// of it.
+/// Whether a landmark may be added. A landmark observed by this scan is not removed to make room
+/// for another one of it.
 bool ActiveMap::make_room(const model::FieldOfView& view, FilterState& state,
                           EkfCounters& counters) {
   const auto& landmarks = state.landmarks();

@@ -1,4 +1,4 @@
-// Which landmarks are in the filter's state, and for how long.
+// Selects which landmarks are in the filter's state, and for how long.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,16 @@
 namespace understory::ekf {
 
 /// Owner of the tracks' landmarks and of the number of scans. The landmarks themselves are in the
-/// state: near landmarks enter it, those out of range, missing, or at odds with it leave it.
+/// state: near landmarks enter it; landmarks that are out of range, missing, or contradict it leave
+/// it.
 class ActiveMap {
  public:
   ActiveMap(const EkfMapParameters& map, const EkfObservationParameters& observation)
       : map_(map), observation_(observation) {}
 
-  /// The next scan begins.
+  /// Begins the next scan.
   void begin_scan() { ++scan_number_; }
-  /// Number of the scan at hand, counted from 1.
+  /// Number of the present scan, counted from 1.
   std::uint64_t scan_number() const { return scan_number_; }
 
   /// Observations of landmarks of `state`; see TrackAliases::known().
@@ -29,26 +30,26 @@ class ActiveMap {
     return aliases_.known(state, update.tracks);
   }
 
-  /// Increases the observation's covariance for the part of its error that it has in common with
-  /// earlier observations of the landmark from the places near by. `distance_m`: driven so far.
+  /// Increases the observation's covariance for the error that it shares with earlier observations
+  /// of the landmark from places near by. `distance_m`: driven so far.
   void weaken(const Pairing& pairing, double distance_m, FilterState& state,
               ScanUpdate& update) const;
-  /// The landmark was observed: its history and mean radius.
+  /// Updates the history and the mean radius of an observed landmark.
   void count_observed(const model::TrackedScan& scan, const Pairing& pairing, FilterState& state,
                       ScanUpdate& update) const;
-  /// The track of an observation is a landmark that was lost.
+  /// Pairs the track of an observation with a lost landmark.
   void rejoin(const model::TrackedScan& scan, const Pairing& pairing, FilterState& state,
               ScanUpdate& update);
 
   /// Adds the observations of unknown tracks as landmarks, none nearer than `min_separation_m` to
-  /// another. A full state gives up the landmark that is out of view for longest.
+  /// another. A full state drops the landmark that is out of view for the longest time.
   void add_new(const model::TrackedScan& scan, double distance_m, const ScanUpdate& update,
                FilterState& state, EkfCounters& counters);
-  /// Counts the scan at landmarks in view that it did not observe.
+  /// Counts a miss for landmarks in view that the scan did not observe.
   void count_missed(const model::FieldOfView& view, FilterState& state) const;
   /// Removes landmarks that are out of range, missing, or refused too often.
   void remove_stale(const model::FieldOfView& view, FilterState& state, EkfCounters& counters);
-  /// Forgets all tracks (after a restart).
+  /// Clears all tracks (after a restart).
   void clear() { aliases_.clear(); }
 
   /// Members of a saved state; see common/state. The rest is configuration.

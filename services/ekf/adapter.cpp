@@ -25,7 +25,7 @@ class EkfAdapter : public bus::Adapter {
     node_ = &node;
     stage_.emplace(parameters_);
     watch_ = HealthWatch(health_);
-    // An increment that the queue drops is a gap in the motion: the queue is long.
+    // A dropped increment is a gap in the motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& increment) { add(increment); },
                                     {.queue_size = 2000});

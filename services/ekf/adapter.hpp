@@ -1,4 +1,4 @@
-// The filter on the bus.
+// Connects the filter to the bus.
 #pragma once
 
 #include <string>

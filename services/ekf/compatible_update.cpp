@@ -5,7 +5,7 @@
 namespace understory::ekf {
 namespace {
 
-/// Pairings removed at once, of their number: a scan at odds with the map ends soon.
+/// Each round removes one pairing plus 1/20 of them, so a scan that contradicts the map ends soon.
 constexpr std::size_t kPartRemoved = 20;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The update by as many landmarks as are compatible together, with a rollback.
+// Update by the landmarks that are compatible together, with a rollback.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace understory::ekf {
 
-/// A copy of a state's covariance, to which a failed update returns. Allocated once.
+/// A copy of a state's covariance, restored after a failed update. Allocated once.
 class CovarianceBackup {
  public:
   /// For states of up to `max_size` rows.
@@ -21,7 +21,8 @@ class CovarianceBackup {
   void take(const FilterState& state) {
     covariance_.topLeftCorner(state.size(), state.size()) = state.covariance();
   }
-  /// Rolls the covariance back. Precondition: `state` has as many landmarks as when it was taken.
+  /// Rolls the covariance back. Precondition: `state` has as many landmarks as at the time of the
+  /// copy.
   void restore(FilterState& state) const {
     state.covariance() = covariance_.topLeftCorner(state.size(), state.size());
   }
@@ -30,7 +31,7 @@ class CovarianceBackup {
   Eigen::MatrixXd covariance_;
 };
 
-/// Memory of the filter's updates, allocated once. Nothing in it outlasts an update.
+/// Memory of the filter's updates, allocated once. Its content is valid during one update only.
 struct UpdateScratch {
   /// For states of up to `max_landmarks` landmarks.
   explicit UpdateScratch(int max_landmarks)
@@ -43,15 +44,15 @@ struct UpdateScratch {
   CovarianceBackup backup;
 };
 
-/// What became of the pairings of an update.
+/// Result of an update.
 struct CompatibleUpdate {
   std::uint32_t removed = 0;  ///< Pairings that did not fit the others.
-  double distance = 0.0;      ///< Squared Mahalanobis distance of those that were used, together.
+  double distance = 0.0;      ///< Joint squared Mahalanobis distance of the used pairings.
 };
 
-/// Updates the state by as many `pairings` as pass the gate of their number together: the worst
-/// ones are removed from `pairings` and counted at their landmark until the rest passes.
-/// `set_gates`: limit of the squared Mahalanobis distance by number of pairings.
+/// Updates the state by the `pairings` that together pass the gate for their number: until the rest
+/// passes, the worst ones are removed from `pairings` and counted at their landmark. `set_gates`:
+/// limit of the squared Mahalanobis distance by number of pairings.
 CompatibleUpdate update_compatible(FilterState& state, std::span<const Observation> observations,
                                    std::vector<Pairing>& pairings,
                                    std::span<const double> set_gates, UpdateScratch& scratch);

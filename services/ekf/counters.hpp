@@ -1,4 +1,4 @@
-// What the filter did and refused, for HEALTH.
+// Counts of used and refused input, for HEALTH.
 #pragma once
 
 #include <cstdint>
@@ -6,11 +6,11 @@
 
 namespace understory::ekf {
 
-/// Counted since the process started; no part of a saved state.
+/// Counts since the process started; not saved.
 struct EkfCounters {
   std::uint64_t odometry = 0;            ///< Increments received.
   std::uint64_t odometry_refused = 0;    ///< Late, repeated, overlapping or not finite.
-  std::uint64_t gaps = 0;                ///< Intervals that no odometry covered.
+  std::uint64_t gaps = 0;                ///< Intervals without odometry.
   std::uint64_t scans = 0;               ///< Scans received.
   std::uint64_t scans_refused = 0;       ///< Late or repeated.
   std::uint64_t landmarks_used = 0;      ///< Observations that updated the state.
@@ -21,9 +21,9 @@ struct EkfCounters {
   std::uint64_t rejoined = 0;     ///< New tracks that were paired with a lost landmark.
   std::uint64_t removed = 0;      ///< Landmarks that left the active state.
   std::uint64_t crept = 0;        ///< Times the vehicle moved while reported stationary.
-  std::uint64_t clock_jumps = 0;  ///< Stamps far behind those before: the filter began anew.
+  std::uint64_t clock_jumps = 0;  ///< Stamps far behind earlier ones: the filter began anew.
   std::uint64_t restarts = 0;     ///< See model::EkfPose::reset_counter.
-  std::string last_reason;        ///< Of the latest refusal or restart.
+  std::string last_reason;        ///< For the latest refusal or restart.
 };
 
 }  // namespace understory::ekf

@@ -23,7 +23,7 @@ EkfOutput Ekf::add(const model::Odometry& increment) {
   EkfOutput output = ahead_->go_ahead();
   given_ = output.pose->utime;
 
-  // It will not be waited for without end.
+  // Waits no longer than the limit.
   if (filter_.waiting_s() > kOldestScan_s) {
     filter_ = *ahead_;
     ahead_.reset();
@@ -48,7 +48,7 @@ EkfOutput Ekf::add(const model::TrackedScan& scan) {
   return output;
 }
 
-/// A pose that was given by a copy that had begun anew is followed by a jump back.
+/// If the copy had restarted, its poses are followed by a jump back.
 void Ekf::drop_copy() {
   if (!ahead_) return;
   const std::uint64_t given = ahead_->counters().restarts;
@@ -71,7 +71,7 @@ EkfCounters Ekf::counters() const {
   return counters;
 }
 
-/// The copy follows from the filter and the odometry that waits in it.
+/// The copy can be rebuilt from the filter and its waiting odometry.
 std::string Ekf::save() const {
   return state::save(kStageFormat, filter_.save(), given_, ahead_.has_value());
 }

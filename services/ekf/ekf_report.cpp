@@ -7,7 +7,7 @@
 namespace understory::ekf {
 namespace {
 
-/// The pose without counts and the scale's error.
+/// The pose, without counts and without the scale's error.
 model::EkfPose pose_of(const FilterState& state, double pitch_tangent) {
   model::EkfPose out;
   const geometry::SE2 pose = vehicle_pose(state);

@@ -1,4 +1,4 @@
-// The filter's outputs, and the last sound pose.
+// The filter's outputs, and the last valid pose.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace understory::ekf {
 
-/// How well a scan fitted, for HEALTH; see ScanUpdate.
+/// Fit of a scan, for HEALTH; see ScanUpdate.
 struct ScanFit {
   std::uint32_t observed = 0;  ///< Usable observations.
   std::uint32_t used = 0;      ///< Observations that updated the state.
@@ -20,17 +20,17 @@ struct ScanFit {
   int nis_degrees = 0;
 };
 
-/// What one message to the filter gives; each part but the last has a channel of its own.
+/// The filter's outputs for one message; each part but the last has a channel of its own.
 struct EkfOutput {
   std::optional<model::EkfPose> pose;
   std::optional<model::EkfMap> map;
   std::optional<model::VelocityCorrection> correction;
-  std::optional<model::EkfLevel> level;  ///< With each pose, where sweeps are levelled.
+  std::optional<model::EkfLevel> level;  ///< With each pose, if sweeps are levelled.
   std::optional<ScanFit> scan;           ///< With a scan.
   bool is_late = false;  ///< A pose of a later time was given already: not to be published.
 };
 
-/// Where the filter starts again when its state is of no use.
+/// The pose at which the filter restarts when its state is unusable.
 struct SoundPose {
   geometry::SE2 ekf_map_T_vehicle;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Right perturbation.
@@ -43,35 +43,35 @@ struct SoundPose {
   }
 };
 
-/// Builds outputs from the state; their sequence numbers are the bus's. Owner of the number of
-/// restarts, and of the last pose that was given.
+/// Builds outputs from the state; the bus adds sequence numbers. Owner of the number of restarts,
+/// and of the last pose given.
 ///
-/// The state's heading is that of the frame to which sweeps and odometry are levelled. A wrong roll
-/// rotates that frame by its product with the tangent of the pitch, on each slope anew; the
-/// published heading is without that rotation. A scale error that all distances have in common
-/// (`scale_sigma`) makes the whole map larger or smaller about its origin. No observation measures
-/// it, so it is added to the published covariances and not to the state's; so is what sweeps that
-/// no IMU has levelled have in common.
+/// The state's heading is that of the frame to which sweeps and odometry are levelled. A roll error
+/// rotates that frame by its product with the tangent of the pitch, differently on each slope; the
+/// published heading is without that rotation. A scale error common to all distances
+/// (`scale_sigma`) scales the whole map about its origin. No observation measures it, so it is
+/// added to the published covariances and not to the state's; likewise the common error of sweeps
+/// that no IMU has levelled.
 class EkfReport {
  public:
   explicit EkfReport(const EkfObservationParameters& parameters)
       : scale_sigma_(parameters.scale_sigma) {}
 
-  /// An increment: whether sweeps are levelled.
+  /// Adds an increment: it tells whether sweeps are levelled.
   void add(const model::Odometry& odometry) { sweep_level_.add(odometry); }
-  /// The pose at `now`, with the level where odometry reports one. `update`: the scan that it
-  /// follows; an empty one after odometry alone.
+  /// The pose at `now`, with the level if odometry reports one. `update`: the scan that it follows;
+  /// empty after odometry alone.
   EkfOutput pose(const FilterState& state, const VehicleMotion& motion, model::Utime now,
                  const ScanUpdate& update);
-  /// Pose, map and velocity correction at `now`, with the level where odometry reports one.
+  /// Pose, map and velocity correction at `now`, with the level if odometry reports one.
   EkfOutput all(const FilterState& state, const VehicleMotion& motion, model::Utime now,
                 const ScanUpdate& update);
 
-  /// The map begins: `state` is the first sound pose.
+  /// The map begins: `state` is the first valid pose.
   void begin(const FilterState& state, const VehicleMotion& motion);
-  /// Counts a restart, which consumers see in EkfPose::reset_counter.
+  /// Counts a restart, published as EkfPose::reset_counter.
   void count_restart() { ++reset_counter_; }
-  /// The last pose that was given.
+  /// The last pose given out.
   const SoundPose& last_sound() const { return last_sound_; }
 
   /// Members of a saved state; see common/state. The rest is configuration.

@@ -17,11 +17,11 @@ namespace understory::ekf {
 namespace {
 
 constexpr state::Format kFormat{"ekf", 9};
-/// Variance of the first pose, by definition the map's origin; above zero for the factorisations.
+/// Variance of the first pose, which defines the map's origin; above zero for the factorisations.
 constexpr double kStartVariance = 1e-12;
 /// Searches for lost landmarks per scan.
 constexpr int kMaxRejoinRounds = 4;
-/// Time that creeping may have lasted before it was found [s].
+/// Longest time of creeping before its detection [s].
 constexpr double kUnnoticed_s = 0.1;
 
 ErrorForm error_form(const std::string& name) {
@@ -32,19 +32,20 @@ ErrorForm error_form(const std::string& name) {
                               " is not one of right_invariant, first_estimate, plain");
 }
 
-/// After a gap in which the heading became less certain than this the place in the map is found
-/// anew: linear updates are not true any more.
+/// After a gap with a larger uncertainty of the heading the vehicle is localised in the map anew:
+/// linear updates would be wrong.
 constexpr double kAdrift_rad = 0.15;
-/// Observations, and landmarks, that show a place.
+/// Fewest observations, and landmarks, for localisation.
 constexpr std::size_t kFewShowPlace = 3;
-/// How far from the prediction the place is looked for.
+/// Search radius around the prediction.
 constexpr double kPlaceSigmas = 3.0;
 constexpr double kPlaceSlack_m = 5.0;
 
-/// After hours a vehicle may be anywhere; a larger number only costs digits of the covariance [m].
+/// Largest sigma of the position after hours; a larger number only costs digits of the covariance
+/// [m].
 constexpr double kAnywhere_m = 1000.0;
 
-/// Adds to `sigma` (x, y, heading [m, m, rad]) what may have happened in `away_s` at this speed.
+/// Adds the possible motion in `away_s` at this speed to `sigma` (x, y, heading [m, m, rad]).
 void add_time_away(double away_s, double speed_mps, const EkfMotionParameters& motion,
                    Eigen::Vector3d& sigma) {
   const double spread = motion.gap_acceleration * std::sqrt(away_s * away_s * away_s / 3.0);
@@ -53,7 +54,7 @@ void add_time_away(double away_s, double speed_mps, const EkfMotionParameters& m
   sigma.z() = std::min(std::hypot(sigma.z(), motion.gap_yaw_rate * away_s), kAnyHeading_rad);
 }
 
-/// Puts the vehicle at `last`, stationary; `sigma`: what is added to its uncertainty.
+/// Places the vehicle at `last`, stationary; `sigma`: added to its uncertainty.
 void place_at(const SoundPose& last, const Eigen::Vector3d& sigma, FilterState& state) {
   state.anchor_m.setZero();
   state.position = last.ekf_map_T_vehicle.translation();
@@ -91,7 +92,7 @@ void Filter::add(const model::Odometry& increment) {
     return;
   }
 
-  // The map begins where the vehicle's motion is known.
+  // The map begins when the vehicle's motion is known.
   if (!timeline_.has_begun()) {
     if (!timeline_.may_begin(increment)) return;
     begin(increment.from_utime);
@@ -128,17 +129,17 @@ EkfOutput Filter::add(const model::TrackedScan& scan) {
   advance(scan.utime);
   if (timeline_.is_behind(scan.utime)) bridge(scan.utime);
 
-  // Landmarks that move together show a vehicle that is not stationary.
+  // Common motion of the landmarks shows that the vehicle is not stationary.
   ScanUpdate update = read(scan);
   if (doubt_.is_adrift && !find_place(scan, update))
     return report_.all(state_, motion_, timeline_.now(), update);
   check_stationary(update);
 
-  // Update by known landmarks, then by lost ones, for which the pose is now better known.
+  // Updates by known landmarks, then by lost ones, with the improved pose.
   update_known(scan, update);
   rejoin_lost(scan, update);
 
-  // New landmarks enter the map, others leave it; a filter that is lost starts again.
+  // Adds and removes landmarks; restarts a lost filter.
   maintain_map(scan, update);
 
   stationary_.confirm_motion(timeline_.now(), update.used);
@@ -159,7 +160,7 @@ void Filter::begin(model::Utime utime) {
   report_.begin(state_, motion_);
 }
 
-/// Goes on from the last sound pose, without a map. `away_s`: nothing is known of so long.
+/// Restarts at the last valid pose, without a map. `away_s`: time without information.
 void Filter::restart(model::Utime utime, const std::string& reason, double away_s) {
   const double speed_mps = is_sound(state_) ? state_.velocity.norm() : 0.0;
   count_restart(reason);
@@ -176,7 +177,7 @@ void Filter::restart(model::Utime utime, const std::string& reason, double away_
   place_at(report_.last_sound(), sigma, state_);
 }
 
-/// False where the increment is late; a clock that jumped back restarts the filter.
+/// False for a late increment; a clock that jumped back restarts the filter.
 bool Filter::accept(const model::Odometry& increment) {
   switch (queue_.order_of(increment, timeline_.now())) {
     case StampOrder::kInOrder:
@@ -244,7 +245,7 @@ void Filter::use(const model::Odometry& increment) {
       stationary_.is_stationary(increment, timeline_.now(), motion_.distance_m(), state_);
   if (!was_doubted && stationary_.is_doubted()) ++counters_.crept;
 
-  // Predict, and measure what a stationary vehicle is known to do.
+  // Predicts, and applies the measurements of a stationary vehicle.
   motion_.predict(increment, is_stationary, state_, scratch_.low_rank);
   if (is_stationary) stationary_.hold(state_, scratch_);
   timeline_.move_to(increment.utime);
@@ -262,7 +263,7 @@ void Filter::bridge(model::Utime utime) {
   const double duration = seconds(utime - timeline_.now());
   const std::string reason = fmt::format("nothing came for {:.2f} s", duration);
 
-  // Dead reckoning may have gone on.
+  // Dead reckoning may have continued.
   if (const auto motion = reckoned_.between(timeline_.now(), utime)) {
     motion_.bridge(*motion, duration, state_, scratch_.low_rank);
     timeline_.move_to(utime);
@@ -298,8 +299,8 @@ ScanUpdate Filter::read(const model::TrackedScan& scan) {
   return update;
 }
 
-/// After a gap: moves the vehicle to where the scan shows it, and updates by what shows it. False
-/// where it does not show, and linear updates would mislead.
+/// After a gap: localises the vehicle by the scan, and updates by the landmarks used for it. False
+/// if it cannot be localised and linear updates would be wrong.
 bool Filter::find_place(const model::TrackedScan& scan, ScanUpdate& update) {
   if (update.observations.size() < kFewShowPlace) return false;
   const Eigen::Matrix2d spread = state_.covariance_block<2, 2>(kPosition, kPosition);
@@ -339,7 +340,7 @@ void Filter::check_stationary(const ScanUpdate& update) {
   motion_.loosen(kUnnoticed_s, state_, scratch_.low_rank);
 }
 
-/// Landmarks whose track continues: each through its own gate, then all through the gate of the
+/// Landmarks with continuing tracks: each through its own gate, then all through the gate of the
 /// set.
 void Filter::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
   std::vector<Pairing> pairings;
@@ -347,7 +348,8 @@ void Filter::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
   for (const Pairing& pairing : map_.known(state_, update))
     if (update.is_settled[pairing.observation]) is_taken[pairing.landmark] = true;
   for (const Pairing& pairing : map_.known(state_, update)) {
-    if (update.is_settled[pairing.observation]) continue;  // It has shown the place after a gap.
+    if (update.is_settled[pairing.observation])
+      continue;  // Already used for localisation after a gap.
     update.is_settled[pairing.observation] = true;
     const Observation& observation = update.observations[pairing.observation];
     if (is_taken[pairing.landmark] ||
@@ -372,8 +374,8 @@ void Filter::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
   for (const Pairing& pairing : pairings) map_.count_observed(scan, pairing, state_, update);
 }
 
-/// Unknown tracks may be landmarks whose track was lost. Each round makes the pose more certain, so
-/// that the next one finds more.
+/// Pairs unknown tracks with landmarks whose track was lost. Each round improves the pose, so the
+/// next one finds more.
 void Filter::rejoin_lost(const model::TrackedScan& scan, ScanUpdate& update) {
   RejoinRules rules{parameters_.gate, gates_, parameters_.map.min_separation_m,
                     parameters_.gate.rejoin_max_nodes};
@@ -401,7 +403,7 @@ void Filter::maintain_map(const model::TrackedScan& scan, const ScanUpdate& upda
   map_.count_missed(scan.field_of_view, state_);
   map_.remove_stale(scan.field_of_view, state_, counters_);
 
-  // Scan after scan at odds with the map: the error is larger than the covariance states.
+  // Many successive scans contradict the map: the error is larger than the covariance states.
   doubt_.refused_scans = is_at_odds(update) ? doubt_.refused_scans + 1 : 0;
   if (doubt_.refused_scans >= parameters_.restart.after_refused_scans) {
     restart(timeline_.now(), "most landmarks were refused, scan after scan");

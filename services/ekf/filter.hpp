@@ -24,51 +24,51 @@
 
 namespace understory::ekf {
 
-/// Odometry and tracked landmarks in, pose, map and biases out. A value: a copy goes on like the
+/// Odometry and tracked landmarks in; pose, map and biases out. A value: a copy continues like the
 /// original. One scan costs O(size^2) per 16 landmarks, `size` = 10 + 2 per landmark.
 class Filter {
  public:
-  /// Throws std::invalid_argument where `error_form` is not one of the three names.
+  /// Throws std::invalid_argument if `error_form` is not one of the three names.
   explicit Filter(const EkfParameters& parameters);
 
-  /// Odometry waits for the scan at its end. Late, overlapping and broken increments are refused
-  /// and counted.
+  /// Adds odometry, which waits for the scan at its end. Late, overlapping and invalid increments
+  /// are refused and counted.
   void add(const model::Odometry& increment);
   /// Whether increments have waited for their scan for longer than `max_scan_delay_s`.
   bool has_overdue() const { return queue_.overdue().has_value(); }
-  /// How much odometry waits [s].
+  /// Duration of the waiting odometry [s].
   double waiting_s() const { return queue_.waiting_s(); }
-  /// Uses the increments that are overdue, and gives the pose. Precondition: has_overdue().
+  /// Uses the overdue increments, and returns the pose. Precondition: has_overdue().
   EkfOutput go_ahead();
-  /// Dead reckoning, which gives the motion over an interval of which no odometry came.
+  /// Adds a pose of dead reckoning: the motion over an interval without odometry.
   void add(const model::RawPose& pose);
-  /// Pose, map and velocity correction at the scan's stamp; nothing from a late or repeated scan,
-  /// nor before the map begins (EkfPriorParameters::wait_s).
+  /// Pose, map and velocity correction at the scan's stamp; none for a late or repeated scan, nor
+  /// before the map begins (EkfPriorParameters::wait_s).
   EkfOutput add(const model::TrackedScan& scan);
 
   /// Whether a scan with this stamp would be used: it is in order, and the map has begun or begins.
   bool takes_scan_at(model::Utime utime) const;
-  /// Consumers must not rely on what was given before; see model::EkfPose::reset_counter.
+  /// Counts a restart: earlier outputs are no longer valid; see model::EkfPose::reset_counter.
   void count_restart(const std::string& reason);
-  /// What was used and refused since the object was made.
+  /// Counts since the object was made.
   const EkfCounters& counters() const { return counters_; }
   /// The estimate at utime().
   const FilterState& state() const { return state_; }
   /// Stamp of the estimate; 0 before the map begins.
   model::Utime utime() const { return timeline_.now(); }
 
-  /// The state as bytes: a filter that loads them goes on with bitwise equal outputs.
+  /// The state as bytes: a filter that loads them continues with bitwise equal outputs.
   std::string save() const;
-  /// Throws std::invalid_argument where the bytes are damaged, of another version or error form, or
-  /// hold more landmarks than `max_landmarks`; then nothing has changed.
+  /// Throws std::invalid_argument, without change, if the bytes are damaged, of another version or
+  /// error form, or hold more landmarks than `max_landmarks`.
   void load(const std::string& state);
 
  private:
-  /// What speaks against the estimate.
+  /// Evidence against the estimate.
   struct Doubt {
     int refused_scans = 0;   ///< Consecutive scans of which most landmarks were refused.
-    bool is_adrift = false;  ///< After a gap: the place in the map is yet to be found.
-    int adrift_scans = 0;    ///< Scans that did not show it.
+    bool is_adrift = false;  ///< After a gap: the vehicle is not localised in the map yet.
+    int adrift_scans = 0;    ///< Scans that did not localise it.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& self) {
@@ -76,7 +76,7 @@ class Filter {
     }
   };
 
-  // Beginning and restarts.
+  // Start and restarts.
   void begin(model::Utime utime);
   void restart(model::Utime utime, const std::string& reason, double away_s = 0.0);
 
@@ -97,8 +97,8 @@ class Filter {
   void maintain_map(const model::TrackedScan& scan, const ScanUpdate& update);
 
   EkfParameters parameters_;
-  Gates gates_;            ///< Made from parameters_.
-  UpdateScratch scratch_;  ///< Holds nothing from one message to the next.
+  Gates gates_;            ///< Computed from parameters_.
+  UpdateScratch scratch_;  ///< Valid during one message only.
   FilterState state_;
   Timeline timeline_;
   OdometryQueue queue_;

@@ -61,7 +61,7 @@ void FilterState::add_landmark(const MapLandmark& landmark, const Eigen::Vector2
   added.position = position + offset;
   added.first_position = added.position;
 
-  // Its error is the position's, plus the heading's by the offset (zero if right invariant), less
+  // Its error: the position's, plus the heading's times the offset (zero if right invariant), minus
   // the level's, plus noise.
   const Eigen::Vector2d by_heading =
       geometry::perpendicular(offset) + lever(position) - lever(added.position);

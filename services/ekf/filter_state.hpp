@@ -14,13 +14,13 @@
 
 namespace understory::ekf {
 
-/// How an error of the state is measured. With S = rotation by 90 degrees to the left, heading
-/// error t and an error d, in the axes of the map, of any point or velocity x:
+/// Definition of the state's error. With S = rotation by 90 degrees to the left, heading error t
+/// and an error d, in the axes of the map, of any point or velocity x:
 ///  * right invariant (Barrau & Bonnabel 2017): d - t S x. A rotation of the whole map is then an
 ///    error of the heading alone, whatever the estimates are, so linearisation at changing
 ///    estimates creates no false information about the heading.
-///  * plain: d, as in textbooks. The heading becomes too certain: no measurement observes it.
-///  * first estimate (Huang, Mourikis & Roumeliotis 2010): d, with Jacobians taken at the first
+///  * plain: d, as in textbooks. The heading becomes overconfident: no measurement observes it.
+///  * first estimate (Huang, Mourikis & Roumeliotis 2010): d, with Jacobians at the first
 ///    estimates.
 enum class ErrorForm : std::uint8_t { kRightInvariant, kFirstEstimate, kPlain };
 
@@ -45,23 +45,23 @@ using VehicleMatrix = Eigen::Matrix<double, kVehicle, kVehicle>;
 
 /// A landmark of the state and its history. Its covariance is in FilterState.
 struct MapLandmark {
-  /// Track with which it began; 0 = a mark on the ground (ground_marks.hpp).
+  /// Its first track; 0 = a mark on the ground (ground_marks.hpp).
   model::TrackId id = 0;
   Eigen::Vector2d position = Eigen::Vector2d::Zero();        ///< From the anchor [m].
   Eigen::Vector2d first_position = Eigen::Vector2d::Zero();  ///< `position` when it was added [m].
   double radius_m = 0.0;                                     ///< Mean radius; 0 = unknown.
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
   std::uint32_t observation_count = 0;
-  std::uint32_t missed = 0;     ///< Consecutive scans that should have observed it and did not.
+  std::uint32_t missed = 0;     ///< Consecutive scans with it in view that did not observe it.
   std::uint32_t refused = 0;    ///< Consecutive scans in which its gate refused it.
   std::uint64_t last_scan = 0;  ///< Number of the latest scan that observed it.
   /// Effective number of observations with the same correlated error, the latest one included.
   double views = 0.0;
   double observed_at_m = 0.0;         ///< Distance driven at the latest observation.
   double observed_variance_m2 = 0.0;  ///< Variance of the latest observation, per axis.
-  double height_m = 0.0;              ///< Above the vehicle's origin; 0 = the level took no part.
+  double height_m = 0.0;  ///< Above the vehicle's origin; 0 = without effect of the level.
 
-  /// True for a mark on the ground, which is no landmark of the map.
+  /// Whether it is a mark on the ground, not a landmark of the map.
   bool is_ground_mark() const { return id == 0; }
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -73,7 +73,7 @@ struct MapLandmark {
 };
 
 /// Writes or reads the lower triangle of the first `size` rows of a square matrix, column by
-/// column: half the bytes of the whole. The rest of the matrix is left as it is.
+/// column: half the bytes of the whole. The rest of the matrix stays unchanged.
 template <class Archive, class Matrix>
 void archive_lower_triangle(Archive& a, Matrix& matrix, int size) {
   for (int c = 0; c < size; ++c) {
@@ -81,15 +81,15 @@ void archive_lower_triangle(Archive& a, Matrix& matrix, int size) {
   }
 }
 
-/// Estimate and covariance. Positions count from the anchor, a point of the map that follows the
-/// vehicle, so that the covariance of right invariant errors stays well conditioned far from the
-/// origin. Memory is allocated once, for `max_landmarks`.
+/// Estimate and covariance. Positions are relative to the anchor, a point of the map that follows
+/// the vehicle, so that the covariance of right invariant errors stays well conditioned far from
+/// the origin. Memory is allocated once, for `max_landmarks`.
 class FilterState {
  public:
   /// An estimate of zero with a covariance of zero and no landmarks.
   FilterState(ErrorForm form, int max_landmarks);
 
-  /// How its errors are measured.
+  /// Definition of its errors.
   ErrorForm form() const { return form_; }
   /// Rows in use.
   int size() const { return kVehicle + 2 * static_cast<int>(landmarks_.size()); }
@@ -107,20 +107,20 @@ class FilterState {
   Eigen::Vector2d anchor_m = Eigen::Vector2d::Zero();  ///< Frame `ekf_map`.
   /// Position as predicted, before any measurement [m]: for first-estimate Jacobians.
   Eigen::Vector2d first_position = Eigen::Vector2d::Zero();
-  /// The same of the velocity [m/s].
+  /// Likewise the velocity [m/s].
   Eigen::Vector2d first_velocity = Eigen::Vector2d::Zero();
 
   /// In the order of their rows; ground marks included.
   const std::vector<MapLandmark>& landmarks() const { return landmarks_; }
-  /// Landmark `i`, to change its history.
+  /// Landmark `i`, for changes of its history.
   MapLandmark& landmark(std::size_t i) { return landmarks_[i]; }
 
   /// Factor of the true heading error in the error of a point x: S x, or zero (see ErrorForm).
   Eigen::Vector2d lever(const Eigen::Vector2d& x) const;
 
-  /// The rows in use. Only the lower triangle has a meaning.
+  /// The rows in use. Only the lower triangle is valid.
   auto covariance() { return covariance_.topLeftCorner(size(), size()); }
-  /// The same to read.
+  /// The same for reading.
   auto covariance() const { return covariance_.topLeftCorner(size(), size()); }
   /// Element (i, j) of the symmetric matrix.
   double covariance(int i, int j) const { return i >= j ? covariance_(i, j) : covariance_(j, i); }
@@ -133,7 +133,7 @@ class FilterState {
     }
     return block;
   }
-  /// The whole covariance, padded as the kernel needs it.
+  /// The whole covariance, padded for the kernel.
   Panel covariance_panel() { return {covariance_.data(), covariance_.outerStride()}; }
   /// Column `j` of the symmetric matrix into `out` (size() rows).
   template <typename Column>
@@ -151,16 +151,17 @@ class FilterState {
   /// max_landmarks().
   void add_landmark(const MapLandmark& landmark, const Eigen::Vector2d& in_vehicle,
                     const Eigen::Matrix2d& variance, double height_m = 0.0);
-  /// Removes a landmark; the rest keeps its estimate and covariance (marginalisation). O(size^2).
+  /// Removes a landmark; the others keep their estimates and covariances (marginalisation).
+  /// O(size^2).
   void remove_landmark(std::size_t i);
   /// Removes all landmarks.
   void clear_landmarks() { landmarks_.clear(); }
-  /// Moves the anchor to the vehicle when that is more than 150 m from it. Estimates in `ekf_map`
-  /// and their covariances stay the same.
+  /// Moves the anchor to the vehicle if they are more than 150 m apart. Estimates in `ekf_map` and
+  /// their covariances stay the same.
   void follow_with_anchor();
 
   /// Members of a saved state; see common/state. The capacity is configuration. Throws
-  /// std::invalid_argument where the state is of another error form or exceeds the capacity.
+  /// std::invalid_argument if the state is of another error form or exceeds the capacity.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     ErrorForm form = self.form_;

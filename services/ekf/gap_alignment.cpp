@@ -12,13 +12,14 @@ namespace {
 /// Tracks that must agree on one pose; fewer only if all do.
 constexpr std::size_t kManyAgree = 4;
 constexpr std::size_t kFewAgree = 3;
-/// Share of the known tracks that must agree: the others may be of objects that moved, or mistaken.
+/// Least share of the known tracks that must agree: the others may belong to moved objects, or be
+/// mismatched.
 constexpr double kAgreeing = 0.6;
-/// Two landmarks nearer than this say little of the heading [m].
+/// Two landmarks at a smaller distance give an inaccurate heading [m].
 constexpr double kShortest_m = 2.0;
-/// Of more tracks the nearest ones are tried.
+/// Of more tracks the nearest ones are used.
 constexpr std::size_t kMostTracks = 40;
-/// What a pose by two landmarks leaves open beside the observations' noise [m].
+/// Uncertainty of a pose by two landmarks beside the observations' noise [m].
 constexpr double kSlack_m = 0.1;
 constexpr double kGateSigmas = 3.5;
 
@@ -26,7 +27,7 @@ double sigma_of(const Observation& observation) {
   return std::sqrt(0.5 * observation.covariance_m2.trace());
 }
 
-/// Pairings that a pose explains.
+/// Pairings that fit a pose.
 std::vector<Pairing> explained(const FilterState& state, const ScanUpdate& update,
                                std::span<const Pairing> known, const geometry::SE2& pose,
                                double slack_m) {
@@ -51,7 +52,7 @@ geometry::SE2 pose_by(const FilterState& state, const ScanUpdate& update,
   return sums.a_T_b();
 }
 
-/// Each two known landmarks give a pose; the one that explains most counts.
+/// Each two known landmarks give a pose; the one with the most fitting pairings is used.
 std::optional<GapAlignment> by_tracks(const FilterState& state, const ScanUpdate& update,
                                       std::vector<Pairing> known) {
   if (known.size() < kFewAgree) return std::nullopt;
@@ -74,7 +75,7 @@ std::optional<GapAlignment> by_tracks(const FilterState& state, const ScanUpdate
     }
   }
 
-  // Once more with all of them.
+  // Fits again with all of them.
   const geometry::SE2 pose = pose_by(state, update, best);
   best = explained(state, update, best, pose, kSlack_m);
   const bool is_enough =

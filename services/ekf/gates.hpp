@@ -8,15 +8,15 @@
 
 namespace understory::ekf {
 
-/// Observations that one search for joint compatibility takes at most.
+/// Most observations in one search for joint compatibility.
 inline constexpr std::size_t kMaxSearched = 24;
 
 /// Gates of a stationary vehicle. Their probability is 1 - 1e-6: a vehicle may be stationary for
-/// hours, in which chance must not pass for motion.
+/// hours, and chance must not be taken for motion.
 struct StationaryGates {
   double velocity = 0.0;       ///< Estimated velocity against zero, 2 degrees of freedom.
-  double common_motion = 0.0;  ///< Motion that all landmarks show together, 3.
-  double ground_marks = 0.0;   ///< Both marks on the ground, 4.
+  double common_motion = 0.0;  ///< Common motion of all landmarks, 3 degrees of freedom.
+  double ground_marks = 0.0;   ///< Both marks on the ground, 4 degrees of freedom.
 };
 
 /// Quantiles of the chi-squared distribution, computed once.

@@ -7,8 +7,9 @@
 namespace understory::ekf {
 namespace {
 
-/// The marks as observed from the parked vehicle. Their noise and their distance are such that both
-/// together measure the position with variance sigma_m^2 per axis and the heading with sigma_rad^2.
+/// The marks as observed from the parked vehicle. Their noise and distance are chosen such that
+/// together they measure the position with variance sigma_m^2 per axis and the heading with
+/// sigma_rad^2.
 std::array<Observation, kGroundMarks> observations(const Sway& sway) {
   const double reach = sway.sigma_m / sway.sigma_rad;
   const Eigen::Matrix2d noise = 2.0 * sway.sigma_m * sway.sigma_m * Eigen::Matrix2d::Identity();
@@ -73,7 +74,7 @@ double common_motion(const FilterState& state, std::span<const Observation> obse
   Eigen::MatrixXd spread(rows, rows);
   Eigen::MatrixX3d motion(rows, 3);
 
-  // Innovations, their covariance, and how they depend on a motion of the vehicle.
+  // Innovations, their covariance, and their Jacobian by a motion of the vehicle.
   for (int a = 0; a < rows; a += 2) {
     const Pairing& pairing = pairings[static_cast<std::size_t>(a / 2)];
     const Observation& observation = observations[pairing.observation];

@@ -1,4 +1,4 @@
-// What HEALTH says of the filter beside faults of single messages.
+// HEALTH of the filter, beside faults of single messages.
 #pragma once
 
 #include <array>
@@ -9,12 +9,12 @@
 
 namespace understory::ekf {
 
-/// When the filter is not well. Ranges and meanings: describe().
+/// Limits of the filter's health conditions. Ranges and meanings: describe().
 struct HealthParameters {
-  int min_observations = 3;    ///< A scan with fewer says nothing about landmarks.
+  int min_observations = 3;    ///< Scans with fewer observations are ignored.
   double lost_sigma_m = 20.0;  ///< Of the position, along its worst axis.
   double nis_sigmas = 4.0;     ///< Of a scan's innovations, as a normal deviate.
-  double nis_ratio = 1.7;      ///< The same, by its expectation.
+  double nis_ratio = 1.7;      ///< The same, relative to its expectation.
   bus::ConditionLimits lost{20, 10};
   bus::ConditionLimits diverged{20, 6};
   bus::ConditionLimits restarted{50, 1};
@@ -23,20 +23,20 @@ struct HealthParameters {
 /// Adds the parameters to the table.
 void describe(HealthParameters& parameters, bus::ParameterTable& table);
 
-/// Judges the filter by its latest messages. `lost`: landmarks come and none is used, or the
-/// position has become less certain than `lost_sigma_m`. `diverged`: scan after
-/// scan the innovations are larger than stated. Of a filter whose noise is white and as stated at
-/// most 3 scans in 1000 are so by chance (chi^2 of 6 degrees of freedom; fewer with more
-/// landmarks), and 6 of 20 once in 10^10. `restarted`: the map began anew. `input_refused`:
-/// odometry or scans that are late or broken.
+/// Derives the filter's health from its latest messages. `lost`: landmarks arrive and none is used,
+/// or the uncertainty of the position exceeds `lost_sigma_m`. `diverged`: in many scans the
+/// innovations are larger than stated. If the noise is white and as stated, this holds for at most
+/// 3 scans in 1000 by chance (chi^2 of 6 degrees of freedom; fewer with more landmarks), and for 6
+/// of 20 once in 10^10. `restarted`: the map began anew. `input_refused`: odometry or scans are
+/// late or invalid.
 class HealthWatch {
  public:
-  /// All is well so far.
+  /// No condition is raised.
   explicit HealthWatch(const HealthParameters& parameters = {});
 
-  /// What a message gave, with the filter's counts before and after it.
+  /// The outputs for a message, with the filter's counts before and after it.
   void add(const EkfOutput& output, const EkfCounters& before, const EkfCounters& after);
-  /// What to show.
+  /// The conditions for HEALTH.
   std::array<bus::WatchedCondition, 4> conditions() const {
     return {lost_, diverged_, restarted_, refused_};
   }
@@ -52,10 +52,10 @@ class HealthWatch {
   void add_scan(const ScanFit& scan, const model::EkfPose& pose);
 
   HealthParameters parameters_;
-  /// False where the latest map began without a known place, as after a long pause: how certain the
-  /// vehicle's place in the frame of before is does not matter any more.
+  /// False if the latest map began at an unknown pose, as after a long pause: then the vehicle's
+  /// uncertainty in the earlier frame is irrelevant.
   bool knows_place_ = true;
-  bool has_restarted_ = false;  ///< And no scan since.
+  bool has_restarted_ = false;  ///< Without a scan since.
   bus::WatchedCondition lost_;
   bus::WatchedCondition diverged_;
   bus::WatchedCondition restarted_;

@@ -43,7 +43,7 @@ class Search {
     if (nodes_-- <= 0) return visit(candidates_.size(), distance);
     if (!may_improve(chosen_.size() + (candidates_.size() - level), distance)) return;
 
-    // With each landmark that is still free.
+    // Pairs the observation with each free landmark.
     for (const std::uint32_t landmark : candidates_[level].landmarks) {
       if (is_taken(landmark)) continue;
       if (nodes_-- <= 0) break;
@@ -55,7 +55,7 @@ class Search {
       chosen_.pop_back();
     }
 
-    // Without this observation, if that can still be better than the best.
+    // Skips this observation, if that can still be better than the best.
     if (may_improve(chosen_.size() + (candidates_.size() - level - 1), distance)) {
       visit(level + 1, distance);
     }
@@ -70,8 +70,8 @@ class Search {
                        [&](const Pairing& p) { return p.landmark == landmark; });
   }
 
-  /// Adds two rows to the factor; returns what they add to the squared distance, negative if the
-  /// covariance is not positive definite.
+  /// Adds two rows to the factor; returns their contribution to the squared distance, negative if
+  /// the covariance is not positive definite.
   double extend(const Pairing& pairing) {
     const auto at = static_cast<Eigen::Index>(2 * chosen_.size());
     const Observation& observation = observations_[pairing.observation];

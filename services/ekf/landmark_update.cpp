@@ -93,7 +93,7 @@ double JointUpdate::apply_some(FilterState& state, std::span<const Observation> 
   for (int k = 0; k < 3; ++k) state.copy_column(k, vehicle_.col(k).head(n));
   for (int k = 0; k < 2; ++k) state.copy_column(kLevel + k, vehicle_.col(3 + k).head(n));
 
-  // Innovations, less what earlier steps corrected, and their covariance with the state.
+  // Innovations, without the corrections of earlier steps, and their covariance with the state.
   auto cross = low_rank.cross(n, rows);
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxRows, 1> error(rows);
   for (int k = 0; k < rows; k += 2) {

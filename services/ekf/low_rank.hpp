@@ -7,7 +7,7 @@
 
 namespace understory::ekf {
 
-/// Rows of measurement that one step takes at most.
+/// Most rows of measurement in one step.
 inline constexpr int kMaxRows = 32;
 
 /// Low-rank Kalman steps, with their memory allocated once. A measurement fills cross(), then calls
@@ -17,9 +17,9 @@ class LowRank {
   /// For states of up to `max_size` rows.
   explicit LowRank(int max_size);
 
-  /// Covariance of the state's error with the innovation, to be filled by the caller: size x rows.
+  /// Covariance of the state's error with the innovation, size x rows; the caller fills it.
   auto cross(int size, int rows) { return cross_.topLeftCorner(size, rows); }
-  /// Correction of the state's error gathered since start() (`size` numbers).
+  /// Sum of the corrections of the state's error since start() (`size` numbers).
   auto delta(int size) { return delta_.head(size); }
   /// Begins a measurement of a state of `size` rows: no correction yet.
   void start(int size) { delta_.head(size).setZero(); }
@@ -28,10 +28,10 @@ class LowRank {
   /// Another one.
   auto second(int size) { return second_.head(size); }
 
-  /// Adds the correction by `innovation` (one number per row, without the part that delta() has
-  /// corrected) with covariance `spread` (lower triangle), reduces the state's covariance, and
-  /// returns the squared Mahalanobis distance of the innovation; a negative number, and nothing
-  /// changed, where `spread` is not positive definite. O(size^2 rows).
+  /// Adds the correction by `innovation` (one number per row, without the part already corrected by
+  /// delta()) with covariance `spread` (lower triangle), reduces the state's covariance, and
+  /// returns the squared Mahalanobis distance of the innovation; returns a negative number, without
+  /// change, if `spread` is not positive definite. O(size^2 rows).
   template <typename Innovation, typename Spread>
   double apply(FilterState& state, const Innovation& innovation, const Spread& spread) {
     return apply_rows(state, innovation.data(), spread.data(), spread.outerStride(),

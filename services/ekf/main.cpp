@@ -1,4 +1,4 @@
-// The filter as a process. Its channels: EkfChannels in adapter.hpp, and --help.
+// The filter's process. Its channels: EkfChannels in adapter.hpp, and --help.
 #include "services/ekf/adapter.hpp"
 
 int main(int argc, char** argv) {

@@ -5,13 +5,13 @@
 
 namespace understory::ekf {
 
-/// What is known before the first measurement, about the vehicle's motion and the inertial sensors.
+/// Prior knowledge of the vehicle's motion and the inertial sensors.
 struct EkfPriorParameters {
   double velocity_sigma_mps = 5.0;         ///< Per axis, while the vehicle may move.
   double gyro_bias_sigma = 0.005;          ///< [rad/s]
   double accelerometer_bias_sigma = 0.15;  ///< [m/s^2], the level's error included.
-  /// With an IMU the map begins where the vehicle is found to be stationary, or to move by its
-  /// wheels, but after this time at the latest.
+  /// With an IMU the map begins when the vehicle is stationary, or moves by its wheels, but after
+  /// this time at the latest.
   double wait_s = 1.0;
 };
 
@@ -24,7 +24,7 @@ struct EkfMotionParameters {
   /// grow with time.
   double stationary_sigma_m = 2e-4;
   double stationary_sigma_rad = 3e-5;  ///< The same of the heading.
-  /// Of the velocity across the vehicle, per odometry increment; 0 = it may slide freely.
+  /// Likewise the heading.
   double sideways_sigma_mps = 0.0;
   double gap_acceleration = 2.0;  ///< [m/s^2/sqrt(Hz)] White acceleration without odometry.
   double gap_yaw_rate = 0.5;      ///< [rad/s] Yaw rate without odometry.
@@ -34,22 +34,22 @@ struct EkfMotionParameters {
 
 /// Landmarks of the active state.
 struct EkfMapParameters {
-  int max_landmarks = 150;         ///< Capacity.
-  double min_separation_m = 0.6;   ///< A new landmark nearer to an old one is refused.
-  double keep_range_factor = 1.2;  ///< Landmarks farther than this times the range leave.
-  int max_missed = 100;            ///< Consecutive scans that should have observed it and did not.
-  int max_refused = 5;             ///< Consecutive scans in which its gate refused it: it leaves.
+  int max_landmarks = 150;        ///< Capacity.
+  double min_separation_m = 0.6;  ///< A new landmark within this distance of an old one is refused.
+  double keep_range_factor = 1.2;  ///< Landmarks beyond this multiple of the range are removed.
+  int max_missed = 100;            ///< Consecutive scans with it in view that did not observe it.
+  int max_refused = 5;             ///< Consecutive refusals by its gate: it is removed.
 };
 
-/// Errors that the observations of consecutive scans have in common: a trunk is no exact circle,
-/// and the beams hit the same side of it. They do not average out from one place.
+/// Errors that the observations of consecutive scans share: a trunk is no exact circle, and the
+/// beams hit the same side of it. From one place they do not average out.
 struct EkfObservationParameters {
   /// Share of an observation's variance that is correlated from scan to scan; 0 = white noise.
   double correlated_share = 0.05;
   /// Distance driven over which the correlation falls to 1/e.
   double correlation_m = 20.0;
-  /// Standard deviation of a scale error of all distances, constant for ever (the laser's scale;
-  /// trunks that appear nearer the farther they are). The whole map is too large or small by it.
+  /// Standard deviation of a constant scale error of all distances (the laser's scale; trunks that
+  /// appear nearer the farther they are). The whole map is too large or small by it.
   double scale_sigma = 1e-4;
 };
 
@@ -59,7 +59,7 @@ struct EkfGateParameters {
   double set_probability = 0.999;       ///< chi^2 gate of all landmarks of a scan together.
   double rejoin_probability = 0.99;  ///< Joint compatibility with landmarks whose track was lost.
   int rejoin_after_scans = 3;        ///< Scans without an observation after which a track is lost.
-  /// Lost landmarks whose gate is wider are not searched: it would accept anything.
+  /// Lost landmarks with a wider gate are not searched: the gate would accept anything.
   double rejoin_max_gate_m = 20.0;
   int rejoin_max_nodes = 20000;  ///< Of the searches of one scan.
 };
@@ -70,14 +70,14 @@ struct EkfRestartParameters {
   double sigma_m = 2.0;          ///< Added to the uncertainty of the position, per axis.
   double sigma_rad = 0.2;        ///< Added to the uncertainty of the heading.
   double max_gap_s = 10.0;       ///< Longest interval without odometry and scans.
-  /// A longer one is announced as a restart, also where the map is kept.
+  /// A longer one is announced as a restart, even if the map is kept.
   double announced_gap_s = 1.5;
-  double clock_jump_s = 10.0;  ///< A stamp that is earlier by more starts the clock anew.
+  double clock_jump_s = 10.0;  ///< A stamp earlier by more than this resets the clock.
 };
 
 /// All parameters of the stage.
 struct EkfParameters {
-  /// "right_invariant", "first_estimate" or "plain": how errors are measured (ErrorForm).
+  /// "right_invariant", "first_estimate" or "plain": definition of the errors (ErrorForm).
   std::string error_form = "right_invariant";
   /// Longest time that odometry waits for the scan at its end.
   double max_scan_delay_s = 0.4;

@@ -8,7 +8,7 @@
 namespace understory::ekf {
 namespace {
 
-/// Displacement and change of velocity in the axes of the map, as they depend on the heading at the
+/// Displacement and change of velocity in the axes of the map, as functions of the heading at the
 /// start; for first-estimate Jacobians from first estimates.
 struct Change {
   Eigen::Vector2d position;
@@ -22,14 +22,14 @@ Change change(const FilterState& state, const Transition& t, const Eigen::Vector
           t.velocity - state.first_velocity};
 }
 
-/// Of the velocity that two poses of dead reckoning show, per axis [m/s].
+/// Sigma of the velocity from two poses of dead reckoning, per axis [m/s].
 constexpr double kReckonedVelocity_mps = 0.3;
-constexpr double kGravity = 9.81;  // [m/s^2], as common/model/imu.hpp has it
+constexpr double kGravity = 9.81;  // [m/s^2], equal to common/model/imu.hpp
 
 /// Horizontal part of gravity by a level error of (roll, pitch) [m/s^2/rad].
 Eigen::Matrix2d gravity_by_level() { return kGravity * level_displacement(); }
 
-/// Propagates the level's error and its part in the accelerometer's bias.
+/// Propagates the level's error and its contribution to the accelerometer's bias.
 void pass_level(const FilterState& state, const model::LevelError& level, Transition& t) {
   const Eigen::Matrix2d change = level.memory - Eigen::Matrix2d::Identity();
   t.level = level.memory * state.level;
@@ -97,7 +97,7 @@ void rotate_landmarks(FilterState& state, const Transition& t, const VehicleMatr
   shared.noalias() += arms * (t.yaw_by_bias * vehicle.middleRows<3>(kBias));
 }
 
-/// Propagates the covariance: O(size^2) where right invariant, else O(size).
+/// Propagates the covariance: O(size^2) if right invariant, else O(size).
 void pass_covariance(FilterState& state, const Transition& t, const EkfMotionParameters& parameters,
                      LowRank& low_rank) {
   const int count = state.size() - kVehicle;
@@ -198,7 +198,7 @@ Transition transition_by(const FilterState& state, const geometry::SE2WithCovari
   t.noise_input.block<2, 1>(kVelocity, 0) = v;
   t.noise_input.block<2, 2>(kVelocity, 1) = rotation;
 
-  // Noise: the velocity is the displacement's over the interval, and may change within it.
+  // Noise: the velocity is the displacement divided by the interval, and may change within it.
   const Eigen::Matrix2d displacement_noise = motion.covariance.topLeftCorner<2, 2>();
   const double change_mps = parameters.wheel_acceleration * seconds;
   t.noise(0, 0) = motion.covariance(2, 2);
@@ -217,7 +217,7 @@ Transition transition_over_gap(const FilterState& state, const ReckonedMotion& m
                                double seconds, const EkfMotionParameters& parameters) {
   Transition t = transition_by(state, motion.from_T_to, seconds, parameters);
 
-  // The velocity is that at the end, not the mean one.
+  // The velocity at the end, not the mean one.
   t.velocity = rotation_of(t.heading) * motion.velocity_mps;
   const Eigen::Vector2d v = geometry::perpendicular(t.velocity) - state.lever(t.velocity);
   t.error.block<2, 1>(kVelocity, kHeading) = v;
@@ -231,7 +231,7 @@ Transition transition_over_gap(const FilterState& state, const ReckonedMotion& m
 
 void initialise_level(FilterState& state, const model::LevelError& level) {
   Eigen::Matrix<double, kVehicle, 2> by_level = Eigen::Matrix<double, kVehicle, 2>::Zero();
-  // In the heading, and in right invariant errors, which depend on it.
+  // The level affects the heading, and right invariant errors, which depend on it.
   by_level(kHeading, 0) = level.pitch_tangent;
   by_level.block<2, 1>(kPosition, 0) = -level.pitch_tangent * state.lever(state.position);
   by_level.block<2, 1>(kVelocity, 0) = -level.pitch_tangent * state.lever(state.velocity);
@@ -256,7 +256,7 @@ void predict(FilterState& state, const model::Preintegration& inertial,
   const model::Preintegration own = at_bias(inertial, state.bias);
   const Eigen::Matrix2d back = rotation_of(state.heading).transpose();
 
-  // Measured: the displacement in the axes of the start.
+  // The measurement: the displacement in the axes of the start.
   Eigen::Matrix<double, 2, kVehicle> rows = Eigen::Matrix<double, 2, kVehicle>::Zero();
   rows.col(kHeading) =
       t.seconds * back * (state.lever(state.velocity) - geometry::perpendicular(state.velocity));

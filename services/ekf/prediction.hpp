@@ -1,4 +1,4 @@
-// How the filter's state moves from one stamp to the next.
+// Prediction of the filter's state from one stamp to the next.
 #pragma once
 
 #include "common/model/odometry.hpp"
@@ -9,7 +9,7 @@
 
 namespace understory::ekf {
 
-/// Standard deviation of a heading of which nothing is known.
+/// Standard deviation of an unknown heading.
 inline constexpr double kAnyHeading_rad = 1.8;
 /// Covariance of (yaw, velocity, position).
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
@@ -44,7 +44,7 @@ Transition transition_by(const FilterState& state, const geometry::SE2WithCovari
 Transition transition_over_gap(const FilterState& state, double seconds,
                                const EkfMotionParameters& parameters);
 
-/// Over `seconds` of which dead reckoning alone knows the motion.
+/// Over `seconds` with dead reckoning alone.
 Transition transition_over_gap(const FilterState& state, const ReckonedMotion& motion,
                                double seconds, const EkfMotionParameters& parameters);
 
@@ -61,8 +61,8 @@ void initialise_level(FilterState& state, const model::LevelError& level);
 /// Predicts estimate and covariance. O(size^2) for right invariant errors, else O(size).
 void predict(FilterState& state, const Transition& transition,
              const EkfMotionParameters& parameters, LowRank& low_rank);
-/// Predicts by IMU and updates by the displacement that wheels measured in the same interval, with
-/// regard to the noise that both have in common.
+/// Predicts by IMU and updates by the displacement that wheels measured in the same interval,
+/// including the noise that both have in common.
 void predict(FilterState& state, const model::Preintegration& inertial,
              const MeasuredMotion& measured, const EkfMotionParameters& parameters,
              LowRank& low_rank);

@@ -9,23 +9,25 @@
 namespace understory::ekf {
 namespace {
 
-/// Poses that are kept: 2.5 s at 50 Hz. A scan comes some tenths of a second after its stamp.
+/// Number of poses kept: 2.5 s at 50 Hz. A scan arrives some tenths of a second after its stamp.
 constexpr std::size_t kKept = 128;
-/// A stamp may be so far outside of the poses that it is reached by their twist [us]: an increment
-/// of odometry begins a tenth of a second before the first pose that is heard after a gap.
+/// Longest extrapolation of a pose by its twist [us]: an increment of odometry begins a tenth of a
+/// second before the first pose received after a gap.
 constexpr model::Utime kReach_us = 150'000;
-/// By how much the twist may change in that time, per axis [m/s^2, m/s^2, rad/s^2].
+/// Largest change of the twist in that time, per axis [m/s^2, m/s^2, rad/s^2].
 const Eigen::Vector3d kAcceleration(2.0, 2.0, 0.3);
-/// Poses farther apart have a gap between them [us].
+/// A longer time between poses is a gap [us].
 constexpr model::Utime kGap_us = 250'000;
-/// A clock that jumped back by more begins a new track [us]; what is late by less is left out.
+/// A larger jump back begins a new track [us]; a smaller one makes the pose late, and it is
+/// skipped.
 constexpr model::Utime kJump_us = 1'000'000;
-/// Dead reckoning that is less sure of the heading it turned by had a gap of its own [rad].
+/// With a larger uncertainty of the rotation, dead reckoning had a gap of its own [rad].
 constexpr double kSurelyFollowed_rad = 0.15;
-/// Of the displacement, along and across it: scale of the wheels, slip, steering. They last, and
-/// RAW_POSE, which the filter corrects at each scan otherwise, does not state them.
+/// Relative sigmas of the displacement, along and across it: scale of the wheels, slip, steering.
+/// They are constant errors that RAW_POSE does not state, since the filter normally corrects it at
+/// each scan.
 constexpr double kScale = 0.01;
-/// Rounding of a covariance that has grown [m^2, rad^2].
+/// Rounding of an accumulated covariance [m^2, rad^2].
 constexpr double kRounding = 1e-10;
 
 bool is_usable(const model::RawPose& pose) {
@@ -45,7 +47,7 @@ void ReckonedTrack::add(const model::RawPose& pose) {
   if (poses_.size() > kKept) poses_.pop_front();
 }
 
-/// By the twist of two poses beside the stamp that no gap parts.
+/// Pose from the twist of the two poses around the stamp, if no gap separates them.
 std::optional<ReckonedTrack::Reached> ReckonedTrack::at(model::Utime utime) const {
   for (std::size_t i = 1; i < poses_.size(); ++i) {
     const Pose& a = poses_[i - 1];
@@ -73,7 +75,7 @@ std::optional<ReckonedMotion> ReckonedTrack::between(model::Utime from, model::U
   const std::optional<Reached> end = at(to);
   if (!begin || !end) return std::nullopt;
 
-  // What the covariance has grown by is the motion's. Where it shrank, another track has begun.
+  // The growth of the covariance is that of the motion. If it shrank, another track has begun.
   const geometry::SE2 from_T_to = begin->odom_T_vehicle.mean.inverse() * end->odom_T_vehicle.mean;
   const Eigen::Matrix3d carry = from_T_to.inverse().Adjoint();
   const Eigen::Matrix3d grown =

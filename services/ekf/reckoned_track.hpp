@@ -1,4 +1,4 @@
-// Where dead reckoning was: what it says of an interval of which the filter heard nothing.
+// Dead reckoning's motion over intervals without input to the filter.
 #pragma once
 
 #include <deque>
@@ -15,17 +15,18 @@ struct ReckonedMotion {
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< At its end, axes of the vehicle.
 };
 
-/// The latest RAW_POSE. Dead reckoning goes on while the filter hangs; its last pose before a gap
-/// and its first one after it tell the motion between. No landmark is in it: what the filter taught
-/// it is its velocity of before the gap.
+/// The latest RAW_POSE. Dead reckoning continues while the filter hangs; its last pose before a gap
+/// and its first one after it give the motion between. It contains no landmarks: the filter
+/// affected only its velocity before the gap.
 class ReckonedTrack {
  public:
-  /// What is not finite, late, or aided by GNSS is left out; a clock that jumped back begins anew.
+  /// Adds a pose. Skipped: poses that are not finite, late, or aided by GNSS; a clock that jumped
+  /// back begins a new track.
   void add(const model::RawPose& pose);
 
-  /// The motion from one stamp to another, both within 150 ms of poses. None where poses are
-  /// missing, and where they do not know the motion themselves: dead reckoning began anew, or had
-  /// a gap of its own and states more than 0.15 rad.
+  /// The motion between two stamps, both within 150 ms of poses. None without poses, or if the
+  /// poses do not cover the motion: dead reckoning restarted, or had a gap of its own and states
+  /// more than 0.15 rad.
   std::optional<ReckonedMotion> between(model::Utime from, model::Utime to) const;
 
   /// Members of a saved state; see common/state.
@@ -48,7 +49,7 @@ class ReckonedTrack {
   struct Reached {
     geometry::SE2WithCovariance odom_T_vehicle;
     Eigen::Vector3d twist_per_s = Eigen::Vector3d::Zero();
-    Eigen::Vector3d variance = Eigen::Vector3d::Zero();  ///< Of what lies beyond the poses.
+    Eigen::Vector3d variance = Eigen::Vector3d::Zero();  ///< Of the extrapolation beyond the poses.
   };
   std::optional<Reached> at(model::Utime utime) const;
 

@@ -9,20 +9,20 @@
 namespace understory::ekf {
 namespace {
 
-/// Of more unsettled observations the nearest ones are searched: what a scan may cost is bounded.
+/// Of more unsettled observations the nearest ones are searched: this bounds the cost of a scan.
 constexpr std::size_t kMostUnsettled = 256;
-/// Pairings that must agree where the gates are wide.
+/// Fewest agreeing pairings with wide gates.
 constexpr std::size_t kFewRejoin = 3;
 
 struct LostLandmark {
   std::uint32_t landmark = 0;
-  double gate_m = 0.0;  ///< Radius in which it is searched.
+  double gate_m = 0.0;  ///< Search radius.
 };
 
-/// Lost landmarks that the scan could show.
+/// Lost landmarks in the scan's view.
 struct LostLandmarks {
   std::vector<LostLandmark> landmarks;
-  /// Largest variance of the vehicle's heading against one of them [rad^2].
+  /// Largest variance of the vehicle's heading relative to one of them [rad^2].
   double rotation_variance = 0.0;
 };
 
@@ -51,7 +51,7 @@ LostLandmarks lost_landmarks(const FilterState& state, const model::FieldOfView&
   return lost;
 }
 
-/// Those that no landmark explains yet, ascending.
+/// Observations without a landmark, ascending.
 std::vector<std::uint32_t> unsettled_observations(const ScanUpdate& update) {
   std::vector<std::uint32_t> unsettled;
   for (std::uint32_t k = 0; k < update.observations.size(); ++k) {
@@ -68,7 +68,7 @@ std::vector<std::uint32_t> unsettled_observations(const ScanUpdate& update) {
   return unsettled;
 }
 
-/// Unsettled observations and the lost landmarks that each may be, those with the fewest choices
+/// Unsettled observations and the lost landmarks that may match each, those with the fewest choices
 /// first.
 struct Choices {
   std::vector<Candidates> candidates;
@@ -103,7 +103,8 @@ Choices choices(const FilterState& state, const model::TrackedScan& scan, const 
   return choices;
 }
 
-/// A straight line in place of an arc of uncertain angle is an error too: it counts as noise.
+/// Approximating an arc of uncertain angle by a straight line is an error, too: it is added as
+/// noise.
 std::vector<Observation> with_bend(std::vector<Observation> observations,
                                    double rotation_variance) {
   for (Observation& observation : observations) {
@@ -119,12 +120,12 @@ std::optional<RejoinProposal> find_rejoining(const FilterState& state,
                                              const model::TrackedScan& scan,
                                              const ScanUpdate& update, std::uint64_t scan_number,
                                              const RejoinRules& rules) {
-  // Which observation may be which landmark, each by itself.
+  // Individual candidates of each observation.
   const LostLandmarks lost = lost_landmarks(state, scan.field_of_view, scan_number, rules);
   const Choices found = choices(state, scan, update, lost, rules.gates);
   if (found.candidates.empty()) return std::nullopt;
 
-  // The largest set that is compatible together.
+  // The largest jointly compatible set.
   RejoinProposal proposal;
   proposal.observations = with_bend(update.observations, lost.rotation_variance);
   CompatibleSet set = joint_compatibility(state, proposal.observations, found.candidates,
@@ -132,7 +133,7 @@ std::optional<RejoinProposal> find_rejoining(const FilterState& state,
   proposal.pairings = std::move(set.pairings);
   proposal.nodes = set.nodes;
 
-  // Where the gates are wide, a few agree by chance.
+  // With wide gates a few may agree by chance.
   const bool is_wide = found.widest_gate_m > 2.0 * rules.min_separation_m;
   const std::size_t least = std::max(kFewRejoin, (found.candidates.size() + 1) / 2);
   if (is_wide && proposal.pairings.size() < least) return std::nullopt;

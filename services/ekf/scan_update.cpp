@@ -9,11 +9,12 @@
 namespace understory::ekf {
 namespace {
 
-/// Share of the variance of height that the level causes, below which a detection was not levelled.
+/// Least ratio of a detection's variance of height to that from the level; below it the detection
+/// was not levelled.
 constexpr double kLevelled = 0.5;
-/// Gain of a scan's change of height: it is noisy, and slopes are gentle.
+/// Gain for a scan's change of height: it is noisy, and slopes are gentle.
 constexpr double kRiseGain = 0.2;
-/// Refused observations from which a scan may be at odds with the map.
+/// Fewest refused observations of a scan that contradicts the map.
 constexpr std::uint32_t kFewRefused = 4;
 
 bool is_usable(const model::Detection& detection) {
@@ -28,7 +29,7 @@ Observation observation_of(const model::Detection& detection,
   Observation observation{detection.position_m.head<2>(), whole};
   if (!level_covariance) return observation;
 
-  // A height more certain than the level allows was not levelled.
+  // A height that is more accurate than the level was not levelled.
   const Eigen::Vector2d up(detection.position_m.y(), -detection.position_m.x());
   if (detection.covariance_m2(2, 2) < kLevelled * up.dot(*level_covariance * up)) {
     return observation;
@@ -40,7 +41,7 @@ Observation observation_of(const model::Detection& detection,
   return observation;
 }
 
-/// Change of height against the vehicle that known landmarks have in common, smoothed [m].
+/// Common change of height of known landmarks relative to the vehicle, smoothed [m].
 double common_rise(const FilterState& state, std::span<const Pairing> levelled,
                    const ScanUpdate& update) {
   if (levelled.empty() || has_ground_marks(state)) return 0.0;

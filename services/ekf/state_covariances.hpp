@@ -1,4 +1,4 @@
-// What the filter's state gives of pose, velocity and landmarks in the frames that others use.
+// Pose, velocity and landmarks of the filter's state in output frames.
 #pragma once
 
 #include <cstddef>
@@ -31,8 +31,8 @@ Eigen::Matrix2d landmark_covariance(const FilterState& state, std::size_t i);
 /// True if the vehicle's estimate is finite and no variance is negative or NaN. O(size).
 bool is_sound(const FilterState& state);
 
-/// Sets the covariance to what is known before any measurement, with a pose that is exact, and
-/// removes all landmarks. The estimate is left as it is.
+/// Sets the covariance to the prior, with an exact pose, and removes all landmarks. The estimate
+/// stays unchanged.
 void set_prior(FilterState& state, const EkfPriorParameters& prior);
 
 }  // namespace understory::ekf

@@ -10,11 +10,11 @@
 namespace understory::ekf {
 namespace {
 
-/// `is_stationary` that is doubted is believed after all when it is reported for so long.
+/// Time after which a doubted `is_stationary` is accepted again [s].
 constexpr double kInsistence_s = 10.0;
-/// Landmarks of a scan that show a vehicle's motion.
+/// Fewest landmarks of a scan that prove the vehicle's motion.
 constexpr std::uint32_t kFewLandmarks = 3;
-/// Known landmarks of a scan from which a majority at odds with the map counts.
+/// Fewest known landmarks of a scan for a majority against the map.
 constexpr std::size_t kFewKnown = 4;
 
 }  // namespace
@@ -42,7 +42,7 @@ bool StationaryMonitor::believes(const model::Odometry& increment, model::Utime 
     return false;
   }
 
-  // Doubted for long: the filter's velocity is the one that is wrong.
+  // Doubted for long: the filter's velocity is wrong instead.
   if (doubted_) {
     if (increment.utime - *doubted_ < microseconds(kInsistence_s)) return false;
     doubted_.reset();
@@ -51,7 +51,7 @@ bool StationaryMonitor::believes(const model::Odometry& increment, model::Utime 
     return true;
   }
 
-  // Against the filter's own velocity.
+  // Compares with the filter's own velocity.
   Eigen::Matrix2d spread = velocity_covariance(state).topLeftCorner<2, 2>();
   spread.diagonal().array() += velocity_sigma_mps_ * velocity_sigma_mps_;
   const Eigen::Vector2d velocity = rotation_of(state.heading).transpose() * state.velocity;
@@ -97,8 +97,8 @@ void StationaryMonitor::confirm_motion(model::Utime now, std::uint32_t landmarks
   if (doubted_ && landmarks_used >= kFewLandmarks) doubted_ = now;
 }
 
-/// While the vehicle was stationary, the correlated errors of its landmarks did not count. From
-/// another place they will be different: the landmarks lose that much certainty.
+/// While the vehicle was stationary, the correlated errors of its landmarks were not added. From
+/// another place these errors differ: the variance of the landmarks grows by them.
 void StationaryMonitor::leave_place(double distance_m, FilterState& state) const {
   remove_ground_marks(state);
   for (std::size_t i = 0; i < state.landmarks().size(); ++i) {

@@ -1,4 +1,4 @@
-// Whether the vehicle is stationary, and what the filter does while it is.
+// Detects a stationary vehicle, and holds the estimate while it is.
 #pragma once
 
 #include <optional>
@@ -12,37 +12,37 @@
 
 namespace understory::ekf {
 
-/// Owner of the doubt in odometry's `is_stationary`. While the vehicle is believed to be
-/// stationary, marks on the ground are landmarks of the state (ground_marks.hpp).
+/// Owner of the doubt in odometry's `is_stationary`. While the vehicle is taken to be stationary,
+/// marks on the ground are landmarks of the state (ground_marks.hpp).
 ///
-/// Without wheels `is_stationary` rests on quiet IMU samples, and a smooth road is quiet too. So it
-/// is not believed against the filter's own velocity; once found wrong, it is not believed before
-/// the vehicle is reported to move. After 10 s in which no landmark showed motion it is the filter
-/// that must be wrong.
+/// Without wheels `is_stationary` is inferred from quiet IMU samples, which also occur on a smooth
+/// road. So it is ignored if it contradicts the filter's own velocity; once proved wrong, it is
+/// ignored until the vehicle is reported to move. After 10 s without motion of any landmark the
+/// filter must be wrong instead.
 class StationaryMonitor {
  public:
-  /// Copies what it needs.
+  /// Copies the parameters it needs.
   StationaryMonitor(const EkfParameters& parameters, const StationaryGates& gates);
 
   /// Whether the vehicle is stationary during `increment`, which begins at `now`. Sets the ground
-  /// marks, or leaves the place (leave_place()). `distance_m`: driven so far.
+  /// marks, or removes them (leave_place()). `distance_m`: driven so far.
   bool is_stationary(const model::Odometry& increment, model::Utime now, double distance_m,
                      FilterState& state);
-  /// Measures that the velocity is zero and that the vehicle is where its marks were set; sets new
-  /// marks where it is not (a slammed door). Precondition: the state has ground marks.
+  /// Measures that the velocity is zero and that the vehicle is at its marks; sets new marks if it
+  /// is not (a slammed door). Precondition: the state has ground marks.
   void hold(FilterState& state, UpdateScratch& scratch) const;
-  /// True where the landmarks `known` of a scan show motion of a vehicle with ground marks: all are
+  /// Whether the landmarks `known` of a scan show motion of a vehicle with ground marks: all are
   /// displaced alike, or most are outside of `landmark_gate`.
   bool is_creeping(const FilterState& state, std::span<const Observation> observations,
                    std::span<const Pairing> known, double landmark_gate) const;
-  /// `is_stationary` was found wrong at `now`: it is not believed, and the vehicle leaves its
-  /// place.
+  /// `is_stationary` was proved wrong at `now`: it is ignored from now on, and the marks are
+  /// removed.
   void doubt(model::Utime now, double distance_m, FilterState& state);
-  /// Landmarks of a scan at `now` updated the state: doubt lasts.
+  /// Landmarks of a scan at `now` updated the state: the doubt continues.
   void confirm_motion(model::Utime now, std::uint32_t landmarks_used);
   /// Ends the doubt (after a restart).
   void reset() { doubted_.reset(); }
-  /// True while `is_stationary` is not believed.
+  /// Whether `is_stationary` is ignored.
   bool is_doubted() const { return doubted_.has_value(); }
 
   /// Members of a saved state; see common/state. The rest is configuration.
@@ -59,9 +59,9 @@ class StationaryMonitor {
   StationaryGates gates_;
   Sway sway_;
   double velocity_sigma_mps_ = 0.0;        ///< Of a stationary vehicle.
-  double prior_velocity_sigma_mps_ = 0.0;  ///< Of a vehicle of which nothing is known.
+  double prior_velocity_sigma_mps_ = 0.0;  ///< Of a vehicle with unknown velocity.
   double correlated_share_ = 0.0;          ///< Of an observation's variance.
-  std::optional<model::Utime> doubted_;    ///< When motion was last found.
+  std::optional<model::Utime> doubted_;    ///< Time of the last detected motion.
 };
 
 }  // namespace understory::ekf

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-// Wide vectors never cross a function's boundary here, which is all that the warning is about.
+// Wide vectors are never passed to or from a function here, so the warning does not apply.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace understory::ekf {

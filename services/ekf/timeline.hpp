@@ -1,4 +1,4 @@
-// The filter's time: when its map begins, and which stamps follow in order.
+// The filter's time: start of its map, and order of stamps.
 #pragma once
 
 #include <optional>
@@ -7,7 +7,7 @@
 
 namespace understory::ekf {
 
-/// Stamps of one instant may differ by rounding [us].
+/// Tolerance of stamps of one instant, for rounding [us].
 inline constexpr model::Utime kTolerance_us = 1000;
 
 /// Seconds of a duration in microseconds.
@@ -15,10 +15,10 @@ double seconds(model::Utime duration_us);
 /// Microseconds of a duration in seconds, rounded towards zero.
 model::Utime microseconds(double duration_s);
 
-/// How a stamp follows those before it.
+/// Order of a stamp relative to earlier ones.
 enum class StampOrder { kInOrder, kLate, kClockJumpedBack };
 
-/// How an odometry increment lies to the filter's time.
+/// Relation of an odometry increment to the filter's time.
 enum class Interval {
   kFollows,   ///< It begins at the filter's time.
   kAfterGap,  ///< It begins later.
@@ -31,34 +31,34 @@ enum class Interval {
 /// the map's origin would keep their error.
 class Timeline {
  public:
-  /// `wait_s`: longest wait for a beginning. `clock_jump_s`: a scan that is earlier by more is a
-  /// clock that jumped back.
+  /// `wait_s`: longest wait for the start. `clock_jump_s`: a scan earlier by more than this shows
+  /// that the clock jumped back.
   Timeline(double wait_s, double clock_jump_s);
 
   /// True once the map has begun.
   bool has_begun() const { return has_begun_; }
-  /// True while odometry was received and the map has not begun.
+  /// True after the first odometry, before the map begins.
   bool is_waiting() const { return first_odometry_.has_value(); }
   /// Whether the map may begin with `increment`: without an IMU, stationary, moving by its wheels,
   /// or after the longest wait.
   bool may_begin(const model::Odometry& increment);
-  /// The map begins at `utime`.
+  /// Begins the map at `utime`.
   void begin(model::Utime utime);
 
   /// Stamp of the estimate; 0 before the map begins.
   model::Utime now() const { return now_; }
   /// Sets the stamp of the estimate.
   void move_to(model::Utime utime) { now_ = utime; }
-  /// True where `utime` is later than now() by more than the tolerance.
+  /// Whether `utime` is later than now() by more than the tolerance.
   bool is_behind(model::Utime utime) const { return utime > now_ + kTolerance_us; }
-  /// How `increment` lies to now().
+  /// Relation of `increment` to now().
   Interval interval_of(const model::Odometry& increment) const;
 
-  /// How a scan at `utime` follows the scan before it and the filter's time.
+  /// Order of a scan at `utime` relative to the previous scan and the filter's time.
   StampOrder order_of_scan(model::Utime utime) const;
-  /// The latest scan is that at `utime`.
+  /// Sets the stamp of the latest scan.
   void set_last_scan(model::Utime utime) { last_scan_ = utime; }
-  /// Any scan at now() or later is in order.
+  /// From now on any scan at now() or later is in order.
   void forget_scans() { last_scan_.reset(); }
 
   /// Members of a saved state; see common/state. The rest is configuration.
@@ -71,7 +71,8 @@ class Timeline {
   model::Utime wait_us_;
   model::Utime clock_jump_us_;
   bool has_begun_ = false;
-  std::optional<model::Utime> first_odometry_;  ///< Its start, while the map has not begun.
+  std::optional<model::Utime>
+      first_odometry_;  ///< Start of the first odometry, before the map begins.
   model::Utime now_ = 0;
   std::optional<model::Utime> last_scan_;
 };

@@ -1,4 +1,4 @@
-// Which landmark of the state a track is.
+// Maps tracks to landmarks of the state.
 #pragma once
 
 #include <cstdint>
@@ -15,18 +15,18 @@ namespace understory::ekf {
 /// A landmark keeps the id of its first track. Tracks that begin later may be the same landmark.
 class TrackAliases {
  public:
-  /// Index in `state` of the landmark that `track` is; none where the track is unknown.
+  /// Index in `state` of the landmark of `track`; none for an unknown track.
   std::optional<std::uint32_t> landmark_of(const FilterState& state, model::TrackId track) const;
-  /// Observations whose track is a landmark of `state`, in the order of `tracks`. Indices hold
-  /// until a landmark leaves the state.
+  /// Observations whose track belongs to a landmark of `state`, in the order of `tracks`. Indices
+  /// are valid until a landmark leaves the state.
   std::vector<Pairing> known(const FilterState& state,
                              std::span<const model::TrackId> tracks) const;
 
-  /// `track` is the landmark that began with track `landmark`.
+  /// Assigns `track` to the landmark that began with track `landmark`.
   void set(model::TrackId track, model::TrackId landmark);
-  /// Forgets all tracks of a landmark.
+  /// Removes all tracks of a landmark.
   void forget_landmark(model::TrackId landmark);
-  /// Forgets all tracks.
+  /// Removes all tracks.
   void clear() { aliases_.clear(); }
 
   /// Members of a saved state; see common/state.

@@ -39,7 +39,7 @@ void VehicleMotion::bridge(const ReckonedMotion& motion, double duration_s, Filt
                            LowRank& low_rank) {
   distance_m_ += motion.from_T_to.mean.translation().norm();
   Transition t = transition_over_gap(state, motion, duration_s, parameters_);
-  // How the level's error went on is unknown: it may be another one.
+  // The change of the level's error is unknown: it may be a new one.
   if (level_covariance_) t.level_added = *level_covariance_;
   ekf::predict(state, t, parameters_, low_rank);
 }

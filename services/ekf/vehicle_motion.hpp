@@ -1,4 +1,4 @@
-// The filter's prediction by odometry, and what the latest odometry reports about the level.
+// The filter's prediction by odometry, and the level reported by the latest odometry.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace understory::ekf {
 
-/// Owner of the distance driven and of the level's error as the latest odometry reports it.
+/// Owner of the distance driven and of the level's error reported by the latest odometry.
 class VehicleMotion {
  public:
   explicit VehicleMotion(const EkfMotionParameters& parameters) : parameters_(parameters) {}
@@ -19,22 +19,23 @@ class VehicleMotion {
   /// Predicts `state` to the end of `increment`: by IMU, by wheels, or by both. O(size^2).
   void predict(const model::Odometry& increment, bool is_stationary, FilterState& state,
                LowRank& low_rank);
-  /// Predicts `state` over `duration_s` without odometry, and counts the distance.
+  /// Predicts `state` over `duration_s` without odometry, and adds the distance.
   void bridge(double duration_s, FilterState& state, LowRank& low_rank);
-  /// The same where dead reckoning knows the motion.
+  /// Likewise with the motion by dead reckoning.
   void bridge(const ReckonedMotion& motion, double duration_s, FilterState& state,
               LowRank& low_rank);
-  /// The same without distance: a stationary vehicle may have moved unnoticed for so long.
+  /// Likewise without distance: a stationary vehicle may have moved undetected for this time.
   void loosen(double duration_s, FilterState& state, LowRank& low_rank) const;
   /// The next odometry with an IMU sets the level's first uncertainty (after a restart).
   void forget_level();
 
   /// Distance driven [m].
   double distance_m() const { return distance_m_; }
-  /// Covariance of the level's error (roll, pitch) [rad^2] as detections have it in theirs; none
-  /// before odometry with an IMU was used.
+  /// Covariance of the level's error (roll, pitch) [rad^2] as contained in the detections'
+  /// covariances; none before odometry with an IMU.
   const std::optional<Eigen::Matrix2d>& level_covariance() const { return level_covariance_; }
-  /// Tangent of the vehicle's pitch: a wrong roll changes the heading by so much of it.
+  /// Tangent of the vehicle's pitch: a roll error changes the heading by this factor times the
+  /// error.
   double pitch_tangent() const { return pitch_tangent_; }
 
   /// Members of a saved state; see common/state. The rest is configuration.

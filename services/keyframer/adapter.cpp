@@ -32,7 +32,7 @@ class KeyframerAdapter : public bus::Adapter {
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
                                         [this](const model::LandmarkScan& scan) { add(scan); },
                                         {.queue_size = 200, .most_bytes = most_bytes()});
-    // Increments are small, and a lost one breaks the chain of motion: a long queue.
+    // Increments are small, but a lost one is a gap in the motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& motion) { stage_->add(motion); },
                                     {.queue_size = 2000});
@@ -65,7 +65,7 @@ class KeyframerAdapter : public bus::Adapter {
     show_health();
   }
 
-  /// The numbers, for whoever mends the configuration.
+  /// The numbers, for correcting the configuration.
   void log(const InputQuality& quality) {
     log(quality.calibration, "minutes");
     log(quality.lately, "seconds");

@@ -1,4 +1,4 @@
-// The keyframer on the bus.
+// Connects the keyframer to the bus.
 #pragma once
 
 #include <string>
@@ -17,8 +17,8 @@ struct KeyframerChannels {
   std::string keyframe = all.out("KEYFRAME", "local landmarks of n sweeps");
 };
 
-/// The process: its name, its channels and how to make its adapter. The stage is made when the
-/// service is bound, by the parameters that are then in force.
+/// The service: its name, its channels and the factory of its adapter. The stage is made when the
+/// service is bound, with the parameters of that time.
 bus::Service keyframer_service(const KeyframerChannels& channels = {});
 
 }  // namespace understory::keyframer

@@ -40,7 +40,7 @@ void describe(KeyframerParameters& parameters, bus::ParameterTable& table) {
 
   table.renamed("joint.min_sightings", "joint.min_observations");
   table.renamed("joint.max_turn_rad", "joint.max_rotation_rad");
-  // The thesis's method was a choice of the keyframer.
+  // Earlier versions could choose the method of the thesis.
   const std::string where = "the method of the GeoSLAM thesis runs in understory eval alone";
   table.removed("method", "the keyframer has one method now; " + where);
   table.removed("baseline.", where);

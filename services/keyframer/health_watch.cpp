@@ -6,12 +6,12 @@
 namespace understory::keyframer {
 namespace {
 
-/// By so much a wrong sensor must explain the ways better than wrong wheels.
+/// Least significance of a wrong sensor against wrong wheels.
 constexpr double kSensorSigmas = 6.0;
-/// Up to here the watch's linear model holds [rad].
+/// Limit of the watch's linear model [rad].
 constexpr double kLinearYaw_rad = 0.15;
 
-/// Whether it is true by the last minutes, or by the last seconds.
+/// Whether it holds over the last minutes, or over the last seconds.
 template <class Judge>
 bool either(const InputQuality& quality, const Judge& judge) {
   return judge(quality.calibration) || judge(quality.lately);
@@ -94,7 +94,7 @@ void HealthWatch::judge(const InputQuality& quality) {
   const auto is_off = [this](double error, double sigma, double most) {
     return std::abs(error) > most && std::abs(error) > parameters_.calibration_sigmas * sigma;
   };
-  // Where the turns do not agree the ways say nothing of a mounting or a scale.
+  // If the rotations disagree, the translations give no information on mounting or scale.
   const auto turns_agree = [this](const CalibrationError& error) {
     return error.turn_chi2 <= parameters_.max_turn_chi2;
   };
@@ -116,7 +116,7 @@ void HealthWatch::judge(const InputQuality& quality) {
            moves(error.rate_rad_s, parameters_.max_yaw_error_rad);
   }));
   scale_.condition.add(either(quality, [&](const CalibrationError& error) {
-    // Of a large yaw the cosine would pass for a scale.
+    // The cosine of a large yaw error looks like a scale error.
     return turns_agree(error) && std::abs(error.yaw_rad) < kLinearYaw_rad &&
            is_off(error.scale, error.scale_sigma, parameters_.max_scale_error);
   }));

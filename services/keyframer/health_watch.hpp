@@ -1,4 +1,4 @@
-// What HEALTH says of the keyframer beside faults of single messages.
+// HEALTH of the keyframer, beside faults of single messages.
 #pragma once
 
 #include <array>
@@ -10,9 +10,9 @@
 
 namespace understory::keyframer {
 
-/// When the keyframer is not well. Ranges and meanings: describe().
+/// Limits of the keyframer's health conditions. Ranges and meanings: describe().
 struct HealthParameters {
-  int min_detections = 3;          ///< A scan with fewer says nothing.
+  int min_detections = 3;          ///< Scans with fewer are ignored.
   int keyframe_within_scans = 64;  ///< Scans with detections.
   bus::ConditionLimits lost{20, 8};
   bus::ConditionLimits withheld{8, 4};
@@ -20,32 +20,32 @@ struct HealthParameters {
   bus::ConditionLimits misstated{20, 10};
   bus::ConditionLimits jumped{50, 1};
   double max_yaw_error_rad = 0.0175;  ///< Of landmarks against wheels.
-  double max_place_error_m = 0.04;    ///< Of the sensor, along either axis, or by lateness.
+  double max_place_error_m = 0.04;    ///< Of the sensor, along either axis, or from late stamps.
   double max_scale_error = 0.025;     ///< Of wheels against landmarks.
   double max_turn_chi2 = 4.0;         ///< Of landmarks' turns against the gyro's, on average.
-  double calibration_sigmas = 5.0;    ///< From which such an error counts.
+  double calibration_sigmas = 5.0;    ///< Least significance of such an error.
 };
 /// Adds the parameters to the table.
 void describe(HealthParameters& parameters, bus::ParameterTable& table);
 
-/// Judges the keyframer by its latest scans. `lost`: tracking begins anew again and again, or no
-/// keyframe comes though detections do. `withheld`: keyframes are not good enough to give out.
-/// `input_refused`: scans that are late. `noise_misstated`: scans contradict the covariances that
-/// LANDMARKS states, and those that they show are used but not yet settled; or (channel LANDMARKS)
-/// scans are turned as a whole against the gyro by far more than is stated. `diverged`: landmarks
-/// moved otherwise than odometry says, as after a jump or where wheels slip. `miscalibrated`:
-/// landmarks and odometry contradict each other by more than chance, in the yaw or the place of the
-/// mounting (channel LANDMARKS), in the length of the way (channel ODOMETRY), or in their stamps
-/// (no channel: either clock may be wrong).
+/// Derives the keyframer's health from its latest scans. `lost`: tracking restarts repeatedly, or
+/// no keyframe is made although there are detections. `withheld`: keyframes are not good enough to
+/// publish. `input_refused`: late scans. `noise_misstated`: scans contradict the covariances of
+/// LANDMARKS, and the estimated covariances in use have not settled yet; or (channel LANDMARKS)
+/// rotations of whole scans against the gyro are far larger than stated. `diverged`: the landmarks'
+/// motion contradicts odometry, as after a jump or with slipping wheels. `miscalibrated`: landmarks
+/// and odometry contradict each other beyond chance, in the yaw or the position of the mounting
+/// (channel LANDMARKS), in the length of the path (channel ODOMETRY), or in their stamps (no
+/// channel: either clock may be wrong).
 class HealthWatch {
  public:
-  /// All is well so far.
+  /// No condition is raised.
   explicit HealthWatch(const HealthParameters& parameters = {});
 
   /// A scan, with the keyframer's counts before and after it.
   void add(const model::LandmarkScan& scan, const KeyframerCounters& before,
            const KeyframerCounters& after, const InputQuality& quality = {});
-  /// What to show; no two have channel and reason in common.
+  /// The conditions for HEALTH; no two have channel and reason in common.
   std::array<bus::WatchedCondition, 9> conditions() const {
     return {lost_, withheld_, refused_, misstated_, shaken_, jumped_, mounting_, late_, scale_};
   }

@@ -1,4 +1,4 @@
-// The keyframer as a process. Its channels: KeyframerChannels in adapter.hpp, and --help.
+// The keyframer's process. Its channels: KeyframerChannels in adapter.hpp, and --help.
 #include "services/keyframer/adapter.hpp"
 
 int main(int argc, char** argv) {

@@ -14,7 +14,7 @@ struct JointKeyframerParameters {
   double max_rotation_rad = 0.5;      ///< Largest unpredicted rotation between two scans.
   double min_matched_ratio = 0.5;     ///< Least share of the landmarks that a scan can match.
   int min_matched = 4;                ///< Least number of matches of a scan without odometry.
-  int min_observations = 2;           ///< A landmark with fewer observations is left out.
+  int min_observations = 2;           ///< A landmark with fewer observations is excluded.
   model::DetectionNoiseParameters noise;
 };
 

@@ -7,9 +7,9 @@
 namespace understory::keyframer::joint {
 namespace {
 
-/// Random walk of the gyro's bias, as the filter has it [rad/s/sqrt(s)].
+/// Random walk of the gyro's bias, as in the filter [rad/s/sqrt(s)].
 constexpr double kGyroWalk = 1e-5;
-/// Least standard deviation of the gyro's bias: the scale's error on the move.
+/// Least standard deviation of the gyro's bias: the gyro's scale error in motion.
 constexpr double kGyro_rad_s = 1e-4;
 
 double square(double value) { return value * value; }

@@ -1,4 +1,4 @@
-// The IMU's bias as it is known from keyframe to keyframe.
+// The IMU's bias from keyframe to keyframe.
 #pragma once
 
 #include <optional>
@@ -7,19 +7,21 @@
 
 namespace understory::keyframer::joint {
 
-/// Owns the estimate. Each keyframe teaches it; in between it walks. A keyframe uses what the ones
-/// before it have taught: from its own scans alone, a bias and a curve of the way look alike.
+/// Owns the estimate. Each keyframe updates it; in between it is a random walk. A keyframe uses the
+/// estimate of earlier ones: from its own scans alone, a bias and a curved path cannot be
+/// distinguished.
 class BiasTrack {
  public:
-  /// As known now. Before the first estimate: the bias that `step` took out, the gyro's as sure as
-  /// the rotation `motion` states, the accelerometer's as of any sensor.
+  /// The present estimate. Before the first one: the bias that `step` was corrected by; the gyro's
+  /// with the uncertainty of the rotation of `motion`, the accelerometer's with that of any sensor.
   BiasEstimate known(const model::InertialMotion& step,
                      const geometry::SE2WithCovariance& motion) const;
-  /// A keyframe's estimate.
+  /// Sets a keyframe's estimate.
   void learn(const BiasEstimate& estimate) { estimate_ = estimate; }
-  /// Time passes: the bias walks, and the level's new error is one of the accelerometer's bias.
+  /// Propagates over a step: the bias walks, and the change of the level's error acts as one of the
+  /// accelerometer's bias.
   void pass(const model::InertialMotion& step);
-  /// Nothing is known any more.
+  /// Clears the estimate.
   void forget() { estimate_.reset(); }
 
   /// Members of a saved state; see common/state.

@@ -12,10 +12,10 @@ namespace {
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 constexpr int kMaxIterations = 8;
 constexpr double kConverged = 1e-9;
-/// Information that is left of a pose's parameter where the others are free, as a share of what its
-/// observations hold: below, it is what rounding left over.
+/// Least remaining information of a pose's parameter with the others free, as a share of that of
+/// its observations: less is rounding.
 constexpr double kLeastShare = 1e-10;
-/// Of a pose that nothing observed [1/m^2, 1/rad^2].
+/// Of a pose without observations [1/m^2, 1/rad^2].
 constexpr double kNoInformation = 1e-8;
 
 /// d(centre point)/d(left perturbation of the member's pose).
@@ -25,7 +25,7 @@ Matrix23 point_jacobian(const Eigen::Vector2d& point) {
   return jacobian;
 }
 
-/// The lower triangle on both sides: exactly symmetric.
+/// Mirrors the lower triangle: exactly symmetric.
 template <int N>
 Eigen::Matrix<double, N, N> mirrored(Eigen::Matrix<double, N, N> matrix) {
   for (int i = 0; i < N; ++i) {
@@ -34,14 +34,14 @@ Eigen::Matrix<double, N, N> mirrored(Eigen::Matrix<double, N, N> matrix) {
   return matrix;
 }
 
-/// root^T root: exactly symmetric, and positive semidefinite whatever the scales.
+/// root^T root: exactly symmetric, and positive semidefinite at any scale.
 template <int N>
 Eigen::Matrix<double, N, N> covariance_of(const Eigen::Matrix<double, Eigen::Dynamic, N>& root) {
   return mirrored<N>(root.transpose() * root);
 }
 
-/// One solution of a problem. Poses are perturbed on the left here (in `centre`), which makes a
-/// point's Jacobian depend on the point alone.
+/// Solves one problem. Poses are perturbed on the left here (in `centre`), so that a point's
+/// Jacobian depends on the point alone.
 class BlockAdjuster {
  public:
   explicit BlockAdjuster(const BlockProblem& problem)
@@ -128,7 +128,7 @@ class BlockAdjuster {
     gradient_.segment<3>(a) -= gradient;
   }
 
-  /// The rotation does not count where the IMU tells it.
+  /// Without the rotation if the IMU gives it.
   Eigen::Matrix3d information_of(std::size_t k, const geometry::SE2WithCovariance& motion) const {
     const bool is_by_imu =
         inertial_ && problem_.inertial[k] && !problem_.inertial[k]->is_stationary;
@@ -150,8 +150,8 @@ class BlockAdjuster {
     }
   }
 
-  /// The reduced system with sum(delta) = 0 imposed. Adding C^T C does not change the solution,
-  /// since the gauge directions carry no error.
+  /// The reduced system with the constraint sum(delta) = 0. Adding C^T C does not change the
+  /// solution, since the error does not depend on the gauge directions.
   Eigen::LDLT<Eigen::MatrixXd> factorised() const {
     Eigen::MatrixXd fixed = reduced_;
     const double scale = reduced_.diagonal().mean() / static_cast<double>(members_);
@@ -167,8 +167,8 @@ class BlockAdjuster {
   double step() {
     Eigen::VectorXd delta = -factorised().solve(gradient_);
 
-    // The weights rotate with their members, which the linearisation leaves out. Where they are not
-    // isotropic a trace of common motion remains, which would never converge.
+    // The weights rotate with their members, which the linearisation neglects. Anisotropic weights
+    // leave a small common motion that would never converge.
     Eigen::Vector3d common = Eigen::Vector3d::Zero();
     for (std::size_t k = 0; k < members_; ++k) {
       common += delta.segment<3>(3 * static_cast<Eigen::Index>(k));
@@ -190,13 +190,13 @@ class BlockAdjuster {
     return delta.cwiseAbs().maxCoeff();
   }
 
-  /// Square root of the poses' joint covariance (left perturbation, in `centre`): the covariance
-  /// is root^T root. The gauge term adds 1/(scale n^2) along the common motion; the projection
-  /// removes it. A motion that nothing determines counts with the least information that is told
-  /// from rounding; then `is_determined` becomes false.
+  /// Square root of the poses' joint covariance (left perturbation, in `centre`): the covariance is
+  /// root^T root. The gauge term adds 1/(scale n^2) along the common motion; the projection removes
+  /// it. An undetermined motion gets the least information above rounding; then `is_determined`
+  /// becomes false.
   Eigen::MatrixXd covariance_root(bool& is_determined) const {
     is_determined = true;
-    if (members_ == 1) return Eigen::MatrixXd::Zero(3, 3);  // It is the gauge.
+    if (members_ == 1) return Eigen::MatrixXd::Zero(3, 3);  // It defines the gauge.
 
     const Eigen::LDLT<Eigen::MatrixXd> factor = factorised();
     const Eigen::VectorXd information = factor.transpositionsP() * information_;

@@ -1,4 +1,4 @@
-// Joint maximum-likelihood estimate of a few scans' poses and of the landmarks that they observed.
+// Joint maximum-likelihood estimate of the poses of a few scans and of their landmarks.
 #pragma once
 
 #include <cstdint>
@@ -19,35 +19,36 @@ struct BlockObservation {
   std::uint32_t detection = 0;                              ///< Index in the member's scan.
 };
 
-/// What is to be estimated, and from what.
+/// Unknowns and measurements.
 struct BlockProblem {
-  std::vector<geometry::SE2> local_T_member;  ///< First guess, in any frame `local`.
-  std::vector<Eigen::Vector2d> landmarks;     ///< First guess [m], same frame.
+  std::vector<geometry::SE2> local_T_member;  ///< Initial guess, in any frame `local`.
+  std::vector<Eigen::Vector2d> landmarks;     ///< Initial guess [m], same frame.
   std::vector<BlockObservation> observations;
-  /// motion[k]: from member k to member k + 1, where odometry measured it; size members - 1 or 0.
+  /// motion[k]: from member k to member k + 1, if odometry measured it; size members - 1 or 0.
   std::vector<std::optional<geometry::SE2WithCovariance>> motion;
-  /// The same steps by the IMU; size members - 1 or 0. Of a moving vehicle's `motion` the
-  /// translation alone counts then, since its rotation rests on the same gyro.
+  /// The same steps by the IMU; size members - 1 or 0. For a moving vehicle only the translation of
+  /// `motion` is used then, since its rotation is from the same gyro.
   std::vector<std::optional<model::InertialMotion>> inertial;
-  BiasEstimate bias;  ///< Of the IMU, as known before; used where there is `inertial`.
+  BiasEstimate bias;  ///< Prior of the IMU's bias; used with `inertial`.
 };
 
 /// The estimate in the frame `centre`.
 ///
 /// Detections and odometry leave the motion of the whole block undetermined. It is fixed by the
 /// condition that the members' pose errors sum to zero (inner constraint). In this gauge the
-/// landmarks' errors are as independent as they can be.
+/// correlation of the landmarks' errors is least.
 struct BlockEstimate {
-  bool converged = false;   ///< Within eight iterations.
-  bool determined = false;  ///< Each member's motion against the others, by what was observed.
+  bool converged = false;  ///< Within eight iterations.
+  bool determined =
+      false;  ///< Each member's motion relative to the others is determined by the measurements.
   std::vector<geometry::SE2WithCovariance> centre_T_member;
   std::vector<Eigen::Vector2d> landmarks;  ///< Frame `centre` [m].
-  /// Exact 2 x 2 blocks in that gauge [m^2]; NaN where a landmark has no observation. These and the
+  /// Exact 2 x 2 blocks in that gauge [m^2]; NaN for a landmark without observation. These and the
   /// members' covariances are exactly symmetric and positive semidefinite.
   std::vector<Eigen::Matrix2d> landmark_covariance;
   std::vector<double> chi2;          ///< Per observation, 2 degrees of freedom, after the fit.
-  std::optional<BiasEstimate> bias;  ///< Of the IMU, where there was one.
-  double inertial_chi2 = 0.0;        ///< Of what the IMU measured, after the fit.
+  std::optional<BiasEstimate> bias;  ///< Of the IMU, if there is one.
+  double inertial_chi2 = 0.0;        ///< Of the IMU's measurements, after the fit.
   int inertial_degrees_of_freedom = 0;
 };
 

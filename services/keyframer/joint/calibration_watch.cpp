@@ -8,40 +8,41 @@
 namespace understory::keyframer::joint {
 namespace {
 
-/// What is known before the first comparison, in the order of the numbers.
+/// Prior sigmas, in the order of the numbers.
 const CalibrationNumbers kPrior_sigma =
     (CalibrationNumbers() << 0.2, 1.0, 1.0, 0.2, 0.5, 0.01).finished();
-/// Error of the turn of a step that its covariances do not have [rad]: levelling, the bias's walk.
+/// Error of the rotation of a step that is missing in its covariances [rad]: levelling, the bias's
+/// walk.
 constexpr double kStepModel_rad = 5e-4;
-/// Residual of a turn [sigma] beyond which its weight falls: a wrong pair must not decide.
+/// Residual of a rotation [sigma] beyond which its weight decreases: a wrong pair must not decide.
 constexpr double kRobustTurn = 2.5;
-/// chi^2 of the turn of a step that counts at most, for the same reason.
+/// Largest chi^2 of the rotation of a step, for the same reason.
 constexpr double kMostTurnChi2 = 25.0;
-/// Weight of the statement against what the turns show.
+/// Weight of the stated noise against the measured rotations.
 constexpr double kStatedTurns = 50.0;
 /// Weight of "no bias" [s].
 constexpr double kNoBias_s = 2.0;
-/// chi^2 of 2 degrees of freedom beyond which two ways contradict each other: by chance once in
-/// 10^7. Errors that neither covariance has make it far more frequent.
+/// chi^2 of 2 degrees of freedom beyond which two translations contradict each other: by chance
+/// once in 10^7. Errors outside both covariances make it far more frequent.
 constexpr double kContradiction = 36.0;
-/// Sigmas from which the clock has jumped; and for so long [us]: what it moves leaves its ellipse
-/// later, as the graph gives way slowly.
+/// Sigmas of a jump of the clock, and the time for which it is reported [us]: the displaced
+/// landmarks leave their error ellipses later, since the graph yields slowly.
 constexpr double kJump_sigmas = 4.25;
 constexpr model::Utime kRemembered_us = 10'000'000;
-/// Odometry that no scan has asked for is kept so long [us].
+/// Time for which odometry without scans is kept [us].
 constexpr model::Utime kKept_us = 10'000'000;
-/// Time before and after a motion over which a twist is taken [us]. None of it is within the
-/// motion: the error of its wheels would pass for lateness.
+/// Time before and after a motion over which a twist is averaged [us]. It is outside the motion:
+/// the error of the motion's wheels would be taken for lateness.
 constexpr model::Utime kTwist_us = 200'000;
-/// Increments in a row by other sensors than before, after which they are others.
+/// Successive increments of other sensors than before, after which the sensors have changed.
 constexpr int kOtherIncrements = 10;
-/// Less is a standstill.
+/// A shorter translation is a standstill.
 constexpr double kStands_m = 0.05;
 constexpr double kStands_rad = 0.02;
-/// Motions that wait for odometry.
+/// Most motions that wait for odometry.
 constexpr std::size_t kMostWaiting = 50;
 
-/// One thing is wrong at a time; the gyro's bias is unknown in any case.
+/// Only one thing is wrong at a time; the gyro's bias is always unknown.
 constexpr int kMountFree[] = {kYaw, kPlace, kPlace + 1, kGyroBias};
 constexpr int kClockFree[] = {kLate, kGyroBias};
 constexpr int kScaleFree[] = {kScale, kGyroBias};
@@ -61,8 +62,8 @@ void CalibrationWatch::add(const model::Odometry& increment) {
   note_sensors(increment);
 }
 
-/// Odometry that goes on without IMU or wheels, or with them again, is another measurement: what
-/// was wrong with the one is not wrong with the other.
+/// Odometry that loses or regains IMU or wheels is another measurement: errors of the one are not
+/// errors of the other.
 void CalibrationWatch::note_sensors(const model::Odometry& increment) {
   const bool has_inertial = increment.inertial.has_value();
   const bool is_other = has_inertial != has_inertial_ || increment.has_wheels != has_wheels_;
@@ -90,8 +91,9 @@ std::optional<TwoMotions> CalibrationWatch::two_motions(const model::ScanMotion&
   const auto by_odometry = odometry_.between(then, now);
   if (!by_odometry) return std::nullopt;
 
-  // The twists at both stamps, as if they changed evenly between the middles of two windows. A
-  // constant one says nothing of lateness: so it is where the one or the other is unknown.
+  // The twists at both stamps, interpolated linearly between the middles of two windows. A constant
+  // twist contains no information on lateness; if one of the two is unknown, a constant one is
+  // assumed.
   const auto before = twist_over(then - kTwist_us, then);
   const auto after = twist_over(now, now + kTwist_us);
   const double seconds = seconds_between(then, now);
@@ -205,7 +207,7 @@ void CalibrationWatch::Memory::compare_turns(const TwoMotions& motions, double o
 }
 
 void CalibrationWatch::Memory::compare_ways(const TwoMotions& motions) {
-  // Who stands measures no mounting, whatever the gyro says.
+  // A stationary vehicle measures no mounting, whatever the gyro says.
   if (motions.by_odometry.mean.translation().norm() < kStands_m &&
       std::abs(motions.by_landmarks.mean.theta()) < kStands_rad)
     return;
@@ -261,7 +263,7 @@ CalibrationError CalibrationWatch::Memory::error() const {
   error.scale = estimate(kScale);
   error.scale_sigma = sigma(kScale);
   error.turn_chi2 = (turn_chi2_ + kStatedTurns) / (turns_ + kStatedTurns);
-  // Turns that scatter by more than is stated show it so much less.
+  // Rotations that scatter by more than stated give less information in proportion.
   error.late_s = estimate(kLate);
   error.late_sigma_s = sigma(kLate) * std::sqrt(std::max(1.0, error.turn_chi2));
   error.speed_mps = std::sqrt(moved_m2ps_ / seconds);

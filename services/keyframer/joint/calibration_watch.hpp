@@ -1,4 +1,4 @@
-// Whether odometry and landmarks agree on how the vehicle moves.
+// Consistency of odometry and landmarks about the vehicle's motion.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,41 +16,41 @@ namespace understory::keyframer::joint {
 
 /// Compares the motion between scans by landmarks alone with that by wheels and gyro.
 ///
-/// A sensor that is mounted at another yaw than configured (by psi) and at another place (by e)
-/// sees the motion T = (R, t) of the vehicle as E T E^-1, E = (e, psi). Wheels of another size
-/// measure a longer or shorter way (by the share s). Scans that are stamped late by tau show
-/// Exp(tau xi_a) T Exp(-tau xi_b), with the twists xi = (v, w) at the two stamps. To first order
+/// A sensor mounted with a yaw error psi and a position error e measures the motion T = (R, t) of
+/// the vehicle as E T E^-1, E = (e, psi). Wheels of another size measure a longer or shorter path
+/// (by the share s). Scans stamped late by tau measure Exp(tau xi_a) T Exp(-tau xi_b), with the
+/// twists xi = (v, w) at the two stamps. To first order
 ///   t_landmarks - t_wheels = psi J t + (I - R) e - s t + tau (v_a + w_a J t - R v_b),
 ///   turn_landmarks - turn_gyro = tau (w_a - w_b) - b seconds,
 /// where b is the gyro's bias: a linear model of six numbers, estimated by least squares over the
-/// last minutes and over the last seconds. Where the way does not show one of them, its sigma stays
-/// large and it is not named. Odometry without wheels is compared by its turn alone: its velocity
-/// comes from landmarks.
+/// last minutes and over the last seconds. If the path does not determine one of them, its sigma
+/// stays large and it is not reported. Odometry without wheels is compared only by its rotation:
+/// its velocity comes from landmarks.
 class CalibrationWatch {
  public:
-  /// Takes odometry as it comes, which no landmark has corrected.
+  /// Adds uncorrected odometry.
   void add(const model::Odometry& increment);
-  /// Takes the motion between two scans by landmarks alone. Motions may overlap: their turns are
-  /// all compared, their ways where they overlap with the last one by no more than half, since
-  /// the error of wheels grows with the way.
+  /// Adds the motion between two scans by landmarks alone. Motions may overlap: their rotations are
+  /// all compared; their translations only if they overlap the last one by at most half, since the
+  /// error of wheels grows with the path.
   void add(const model::ScanMotion& motion);
-  /// Takes the motion over JumpWatch::kScans scans to the one of now, or that there is none.
+  /// Adds the motion over the last JumpWatch::kScans scans, or none.
   void watch(model::Utime now, const std::optional<model::ScanMotion>& motion);
-  /// Takes the motion by landmarks alone since the scan before the last one, or that there is none.
+  /// Adds the motion by landmarks alone since the scan before the last one, or none.
   void check(const std::optional<model::ScanMotion>& step);
 
-  /// Takes that no motion explains what two scans in a row observed.
+  /// Records that no motion fits the observations of two successive scans.
   void break_off() { contradicts_ = true; }
 
-  /// What differs by the last two minutes; zeros with large sigmas at the start. Cost: one 6 x 6
+  /// The errors by the last two minutes; zeros with large sigmas at the start. Cost: one 6 x 6
   /// inverse.
   CalibrationError error() const { return minutes_.error(); }
   /// The same by the last ten seconds.
   CalibrationError lately() const { return seconds_.error(); }
 
-  /// Whether the last step is off by far more than both covariances allow, or nothing explains it,
-  /// or the clock seems to have jumped within the last ten seconds: a jump of the landmarks' frame
-  /// or its clock, or wheels that slip.
+  /// Whether the last step differs by far more than both covariances allow, or no motion fits it,
+  /// or the clock jumped within the last ten seconds: a jump of the landmarks' frame or its clock,
+  /// or slipping wheels.
   bool contradicts() const { return contradicts_ || has_jumped_; }
 
   /// Members of a saved state; see common/state.
@@ -63,22 +63,23 @@ class CalibrationWatch {
   }
 
  private:
-  /// Sums over a time; what is older counts less and less.
+  /// Sums with exponential forgetting.
   class Memory {
    public:
     explicit Memory(double memory_s) : memory_s_(memory_s) {}
-    /// chi^2 of 2 degrees of freedom: the two ways, by what is known of the sensor and the wheels.
+    /// chi^2 of 2 degrees of freedom: difference of the two translations, given the estimates for
+    /// sensor and wheels.
     double contradiction(const TwoMotions& motions) const;
-    /// Of two scans in a row.
+    /// Of two successive scans.
     void compare_steps(const TwoMotions& motions);
-    /// So many motions in a row share each part of odometry.
+    /// `overlapping`: number of successive motions that share each part of odometry.
     void compare_turns(const TwoMotions& motions, double overlapping);
     void compare_ways(const TwoMotions& motions);
-    /// What is older than a time that has passed counts less.
+    /// Reduces the weight of the sums by the time passed.
     void forget(double passed_s);
     CalibrationError error() const;
     CalibrationMatrix covariance() const;
-    /// Estimate where only these numbers may differ from 0, and the chi^2 that it explains.
+    /// Estimate with only these numbers free, and the decrease of chi^2.
     struct Account {
       CalibrationNumbers numbers = CalibrationNumbers::Zero();
       double chi2 = 0.0;
@@ -98,7 +99,7 @@ class CalibrationWatch {
     CalibrationNumbers gradient_ = CalibrationNumbers::Zero();
     double turn_chi2_ = 0.0;
     double turns_ = 0.0;       ///< Number of steps in the sum.
-    double turned_rad_ = 0.0;  ///< Difference of the turns: the gyro's bias times turned_s_.
+    double turned_rad_ = 0.0;  ///< Difference of the rotations: the gyro's bias times turned_s_.
     double turned_s_ = 0.0;
     double moved_m2ps_ = 0.0;    ///< Squared speed times turned_s_.
     double moved_rad2ps_ = 0.0;  ///< Squared rate times turned_s_.
@@ -110,9 +111,9 @@ class CalibrationWatch {
   void note_sensors(const model::Odometry& increment);
 
   model::OdometryBuffer odometry_;
-  std::deque<model::ScanMotion> waiting_;  ///< For the odometry after them.
-  model::Utime wheels_since_ = 0;          ///< Since then each increment has wheels.
-  model::Utime due_utime_ = 0;             ///< Ways that end before it overlap too much.
+  std::deque<model::ScanMotion> waiting_;  ///< Wait for the odometry after them.
+  model::Utime wheels_since_ = 0;          ///< Since then every increment has wheels.
+  model::Utime due_utime_ = 0;             ///< Motions that end earlier overlap too much.
   model::Utime last_utime_ = 0;            ///< End of the last motion.
   model::Utime last_start_utime_ = 0;
   static constexpr double kMinutes_s = 120.0;
@@ -123,9 +124,9 @@ class CalibrationWatch {
   bool contradicts_ = false;
   std::optional<model::Utime> jumped_utime_;
   bool has_jumped_ = false;
-  bool has_inertial_ = true;  ///< Of the increments that are compared.
+  bool has_inertial_ = true;  ///< In the compared increments.
   bool has_wheels_ = true;
-  int other_increments_ = 0;  ///< In a row that are otherwise.
+  int other_increments_ = 0;  ///< Successive ones that differ from has_inertial_.
 };
 
 }  // namespace understory::keyframer::joint

@@ -11,14 +11,14 @@ namespace {
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 
-/// Of a velocity of which nothing is known [m/s]: it only keeps the system regular.
+/// Of an unknown velocity [m/s]: keeps the system regular.
 constexpr double kAnyVelocity_mps = 1000.0;
 /// Of the velocity of a stationary vehicle [m/s].
 constexpr double kStandstill_mps = 0.01;
-/// Least variance of (yaw, velocity, position): rounding, and what no noise model has.
+/// Least variance of (yaw, velocity, position): rounding, and unmodelled errors.
 const Vector5 kLeastVariance = (Vector5() << 1e-12, 1e-8, 1e-8, 1e-10, 1e-10).finished();
 /// Least variance of a combination of these, each in units of its standard deviation. The wire
-/// takes eigenvalues of the correlations down to -1e-6 for rounding.
+/// accepts eigenvalues of the correlations down to -1e-6 as rounding.
 constexpr double kLeastOfOwn = 4e-6;
 
 /// The error of one step, and its Jacobians.
@@ -92,7 +92,7 @@ InertialChain::InertialChain(std::span<const std::optional<model::InertialMotion
 
 void InertialChain::add_to(std::span<const geometry::SE2> poses, Eigen::MatrixXd& hessian,
                            Eigen::VectorXd& gradient) {
-  // The velocities and the bias enter the errors linearly: one step from zero finds the best.
+  // The velocities and the bias enter the errors linearly: one step from zero finds the optimum.
   value_ = Eigen::VectorXd::Zero(unknowns());
   Eigen::MatrixXd unused_hessian = Eigen::MatrixXd::Zero(hessian.rows(), hessian.cols());
   Eigen::VectorXd unused_gradient = Eigen::VectorXd::Zero(gradient.size());
@@ -157,7 +157,7 @@ void InertialChain::add(const Step& step, std::span<const geometry::SE2> poses,
   chi2_ += error.value.dot(step.information * error.value);
 }
 
-/// A stationary vehicle: its velocity is zero. That its pose stays is said by odometry.
+/// A stationary vehicle: its velocity is zero. Odometry holds its pose.
 void InertialChain::add_standstill(const Step& step) {
   const auto velocity = static_cast<Eigen::Index>(2 * step.from);
   constexpr double kInformation = 1.0 / (kStandstill_mps * kStandstill_mps);
@@ -168,7 +168,8 @@ void InertialChain::add_standstill(const Step& step) {
 
 BiasEstimate InertialChain::bias(const Eigen::MatrixXd& root) const {
   const Eigen::MatrixXd by_poses =
-      root * coupling_ * covariance_.rightCols<3>();  // Of the bias with the poses' own errors.
+      root * coupling_ *
+      covariance_.rightCols<3>();  // Covariance of the bias with the poses' own errors.
   return {prior_.mean + value_.tail<3>(),
           covariance_.bottomRightCorner<3, 3>() + by_poses.transpose() * by_poses};
 }

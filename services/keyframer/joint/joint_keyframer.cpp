@@ -8,16 +8,17 @@
 namespace understory::keyframer::joint {
 namespace {
 
-/// Detections of two scans in a row from which they contradict odometry where, placed by it, next
-/// to nothing matches.
+/// Number of detections in both of two successive scans above which they contradict odometry if
+/// almost none match at odometry's pose.
 constexpr std::size_t kToContradict = 8;
-/// Share of the pairs by stated sigmas that smaller ones must keep to take their place.
+/// Least share of the pairs with the stated sigmas that smaller sigmas must keep to be used
+/// instead.
 constexpr double kAsMany = 0.8;
-/// A pause ends a keyframe: so much longer than the interval of scans before it, and so long.
-/// Members are one piece by what they see in common; odometry alone is no such tie.
+/// A pause ends a keyframe: this multiple of the previous interval of scans, and this time. Common
+/// landmarks must tie the members; odometry alone is not sufficient.
 constexpr model::Utime kPauseFactor = 4;
 constexpr model::Utime kLeastPause_us = 500'000;
-/// Keyframes of fewer scans wait at the start until so many scans show the noise.
+/// Keyframes of fewer scans wait at the start until this number of scans shows the noise.
 constexpr std::uint64_t kWaitingScans = 4;
 
 constexpr state::Format kFormat{"keyframer.joint", 12};
@@ -46,7 +47,7 @@ std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& ra
   std::optional<model::Keyframe> before;
   if (is_after_pause(raw.utime)) before = break_off();
 
-  // Detections at the true level, and the motion since the last scan where odometry covers it.
+  // Detections with the true level, and the motion since the last scan if odometry covers it.
   const model::LandmarkScan scan = level_.levelled(raw);
   std::optional<geometry::SE2WithCovariance> motion;
   std::optional<model::InertialMotion> inertial;
@@ -55,14 +56,14 @@ std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& ra
     inertial = odometry_.inertial(*last_utime_, scan.utime);
   }
 
-  // Where the scan was made, and which detection is which landmark.
+  // The pose of the scan, and the association of its detections.
   std::optional<PlacedScan> placed = place(scan, motion);
   if (!placed) {
     auto result = start_anew(scan);
     return result ? std::move(result) : std::move(before);
   }
 
-  // Enough scans are one keyframe.
+  // Enough scans make a keyframe.
   gather({scan, std::move(*placed), motion, inertial});
   return is_full() ? finish() : before;
 }
@@ -80,7 +81,7 @@ std::optional<PlacedScan> JointKeyframer::place(
                                          : tracker_.add(noise_.corrected(stated), motion);
   if (!placed) return std::nullopt;
 
-  // Do the landmarks move as odometry says?
+  // Does the landmarks' motion agree with odometry?
   const std::size_t in_both = std::min(noise_.seen_last(), stated.detections.size());
   noise_.add(stated, numbers_of(*placed));
   const auto step = noise_.step();
@@ -91,12 +92,12 @@ std::optional<PlacedScan> JointKeyframer::place(
   return placed;
 }
 
-/// By what is stated, or by larger or smaller noise that explains the scan better.
+/// Tries the stated noise, then larger or smaller noise that fits the scan better.
 std::optional<PlacedScan> JointKeyframer::place_by_tries(
     const model::LandmarkScan& stated, const std::optional<geometry::SE2WithCovariance>& motion) {
   const ScanTracker before = tracker_;
   std::optional<PlacedScan> placed = tracker_.add(noise_.corrected(stated), motion);
-  // In gates that are far too wide nearly everything matches something.
+  // In far too wide gates nearly every detection finds a match.
   const double must_keep =
       placed ? kAsMany * static_cast<double>(noise_.in_common(stated, numbers_of(*placed))) : 0.0;
 
@@ -122,7 +123,8 @@ std::optional<model::Keyframe> JointKeyframer::refuse(std::string reason) {
   return std::nullopt;
 }
 
-/// The chain of scans is broken: what was gathered is given out, and tracking starts at this scan.
+/// Tracking is interrupted: the gathered scans become a keyframe, and tracking restarts at this
+/// scan.
 std::optional<model::Keyframe> JointKeyframer::start_anew(const model::LandmarkScan& scan) {
   std::optional<model::Keyframe> result =
       refuse("scan matches too few of the landmarks of the scans before it");
@@ -139,7 +141,7 @@ std::optional<model::Keyframe> JointKeyframer::start_anew(const model::LandmarkS
   PlacedScan first = tracker_.restart(noise_.corrected(scan));
   noise_.add(scan, numbers_of(first));
   gather({scan, std::move(first), std::nullopt, std::nullopt});
-  return is_full() ? finish() : result;  // Full by one scan: then none was gathered before it.
+  return is_full() ? finish() : result;  // A keyframe of one scan: then none was gathered before.
 }
 
 void JointKeyframer::gather(Member member) {
@@ -159,7 +161,7 @@ std::optional<model::Keyframe> JointKeyframer::finish() {
   return estimated(std::move(members));
 }
 
-/// What was gathered until now, by the local map of now.
+/// The scans gathered until now, with the present local map.
 std::optional<model::Keyframe> JointKeyframer::break_off() {
   stop_waiting();
   if (members_.empty()) return std::nullopt;
@@ -172,7 +174,7 @@ void JointKeyframer::stop_waiting() {
   }
 }
 
-/// The keyframe of its scans, with their noise as known now.
+/// The keyframe of these scans, with the present estimate of their noise.
 std::optional<model::Keyframe> JointKeyframer::estimated(std::vector<Member> members) {
   for (Member& member : members) member.scan = noise_.corrected(std::move(member.scan));
   const MemberBlock block = adjusted(members);
@@ -185,7 +187,7 @@ std::optional<model::Keyframe> JointKeyframer::estimated(std::vector<Member> mem
   model::Keyframe keyframe = to_keyframe(members, block, tracker_.map());
   keyframe.sequence = next_sequence_++;
 
-  // How the base has moved since the base of the keyframe before, as the scans were tracked.
+  // Tracked motion of the base since the base of the previous keyframe.
   const geometry::SE2& local_T_base = members.front().placed.local_T_vehicle;
   if (local_T_previous_base_) {
     keyframe.previous_T_base = local_T_previous_base_->inverse() * local_T_base;
@@ -195,16 +197,16 @@ std::optional<model::Keyframe> JointKeyframer::estimated(std::vector<Member> mem
   return keyframe;
 }
 
-/// The members' estimate, from which the IMU's bias is learned.
+/// The members' estimate, which also updates the IMU's bias.
 MemberBlock JointKeyframer::adjusted(std::span<const Member> members) {
-  // Where tracking began a scan ago, no landmark can have been observed in two.
+  // One scan after a restart of tracking no landmark can have two observations.
   const auto tracked = static_cast<int>(std::min<std::uint64_t>(tracker_.scans(), 1000));
   BlockRules rules{std::min(parameters_.min_observations, tracked),
                    parameters_.motion_sigma_m,
                    parameters_.motion_sigma_rad,
                    {}};
 
-  // The first member's step is not in the block: it ends where the block begins.
+  // The first member's step is not in the block: it ends at the block's start.
   if (members.front().inertial) bias_.pass(*members.front().inertial);
   const auto with_imu = std::ranges::find_if(
       members.subspan(1), [](const Member& member) { return member.inertial && member.motion; });

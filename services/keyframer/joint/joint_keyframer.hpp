@@ -1,4 +1,4 @@
-// Keyframes by joint estimation: scans are tracked one by one, then their poses and landmarks are
+// Keyframes by joint estimation: scans are tracked singly, then their poses and landmarks are
 // estimated together.
 #pragma once
 
@@ -23,31 +23,31 @@
 namespace understory::keyframer::joint {
 
 /// Local bundle adjustment (GeoSLAM §4.2, algorithm 2): n scans become one keyframe. All inputs
-/// come in order of time; what cannot be used is counted, never thrown. Keyframes are in the frame
-/// `centre`, in which the errors of the member poses sum to zero and the landmarks' errors are as
-/// independent as they can be (block_adjustment.hpp).
+/// come in order of time; invalid input is counted and throws no exception. Keyframes are in the
+/// frame `centre`, in which the errors of the member poses sum to zero and the correlation of the
+/// landmarks' errors is least (block_adjustment.hpp).
 class JointKeyframer {
  public:
-  /// Starts without any landmark.
+  /// Starts without landmarks.
   explicit JointKeyframer(const JointKeyframerParameters& parameters);
 
-  /// A scan that is not later than the last one is refused. One that matches too little of the
-  /// local map ends the keyframe: what was gathered (two scans or more) is given out as a short
-  /// one. Cost O(detections) per scan, O(observations n + n^3) for the n-th of a keyframe.
+  /// Adds a scan. One that is not later than the last is refused. A scan with too few matches in
+  /// the local map ends the keyframe: the gathered scans (two or more) become a short one. Cost
+  /// O(detections) per scan, O(observations n + n^3) for the n-th of a keyframe.
   std::optional<model::Keyframe> add(const model::LandmarkScan& scan);
-  /// Keyframes that come before the one that add() returned; ask after each scan. Where a keyframe
-  /// is one or two scans, the first ones wait until three more scans show how far detections
-  /// scatter: the map's frame would keep what is stated wrongly.
+  /// Keyframes to publish before the one that add() returned; call it after each scan. If a
+  /// keyframe has one or two scans, the first ones wait until three more scans show the scatter of
+  /// detections: the map's frame would keep an error from wrongly stated noise.
   std::vector<model::Keyframe> take_waited() { return std::exchange(waited_, {}); }
-  /// Motion of the vehicle by wheels or IMU, where there is any. It must come before the scan at
-  /// its end. It predicts the next scan and bridges scans with few landmarks. Increments that
-  /// overlap or run backwards are ignored.
+  /// Motion of the vehicle by wheels or IMU, if available. It must arrive before the scan at its
+  /// end. It predicts the next scan and bridges scans with few landmarks. Increments that overlap
+  /// or run backwards are ignored.
   void add(const model::Odometry& odometry);
-  /// The error of roll and pitch as the filter estimates it: scans within 2 s of its utime are
-  /// corrected by it.
+  /// The filter's estimate of the roll and pitch error: scans within 2 s of its utime are corrected
+  /// by it.
   void add(const model::EkfLevel& level) { level_.set(level); }
 
-  /// What the scans say of themselves and of odometry.
+  /// Quality of the scans and of odometry.
   InputQuality input_quality() const {
     return {noise_.is_adjusting(), calibration_.error(), calibration_.lately(),
             calibration_.contradicts()};
@@ -57,7 +57,7 @@ class JointKeyframer {
 
   /// The format is "keyframer.joint" of common/state.
   std::string save() const;
-  /// Throws std::invalid_argument on other bytes; the state is then as before.
+  /// Throws std::invalid_argument on other bytes; the state is then unchanged.
   void load(const std::string& bytes);
 
   /// Members of a saved state; see common/state. The parameters are configuration.
@@ -91,13 +91,13 @@ class JointKeyframer {
   model::OdometryBuffer odometry_;
   BiasTrack bias_;
   model::LevelCorrection level_;
-  std::vector<Member> members_;  ///< Of the keyframe that is being gathered; noise as stated.
+  std::vector<Member> members_;               ///< Of the present keyframe; with noise as stated.
   std::vector<std::vector<Member>> waiting_;  ///< Of the first keyframes.
   std::vector<model::Keyframe> waited_;
   std::optional<model::Utime> last_utime_;
   model::Utime interval_us_ = 0;  ///< Between the last two scans; 0 = unknown.
   std::uint64_t next_sequence_ = 0;
-  std::optional<geometry::SE2> local_T_previous_base_;  ///< None where tracking began anew.
+  std::optional<geometry::SE2> local_T_previous_base_;  ///< None after a restart of tracking.
   KeyframerCounters counters_;
 };
 

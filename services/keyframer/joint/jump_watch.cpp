@@ -9,17 +9,18 @@ namespace {
 
 /// Motions over which the scatter is averaged: 20 s at 10 Hz.
 constexpr double kMemory = 200.0;
-/// A motion counts in the scatter up to so many times what it was: a jump is none.
+/// A motion adds to the scatter at most this multiple of the present scatter: so a jump does not
+/// raise it.
 constexpr double kMostScatter = 4.0;
-/// Share of the variance of one motion's odometry that is in the mean of motions of which each
-/// overlaps the next: of white noise under a triangle.
+/// Variance of odometry in the mean of motions that each overlap the next, as a share of that of
+/// one motion: white noise under a triangular window.
 constexpr double kOverlap = 2.0 / 3.0;
 
 }  // namespace
 
 void JumpWatch::add(const TwoMotions& motions, const CalibrationNumbers& calibration,
                     const CalibrationMatrix& covariance) {
-  // What a wrong calibration makes of the motion, in the axes of its end.
+  // Effect of the calibration error on the motion, in the axes of its end.
   const Eigen::Matrix2d end_R_start = motions.by_odometry.mean.rotation().transpose();
   Eigen::Matrix<double, 3, kCalibrationNumbers> jacobian;
   jacobian.topRows<2>() = end_R_start * way_difference(motions).jacobian;
@@ -28,7 +29,7 @@ void JumpWatch::add(const TwoMotions& motions, const CalibrationNumbers& calibra
   Left& left = motions_[count_ % kScans];
   left.value = (motions.by_odometry.mean.inverse() * motions.by_landmarks.mean).Log() -
                jacobian * calibration;
-  // All motions share the calibration's error: no part of it averages out.
+  // All motions share the calibration's error: it does not average out.
   left.landmarks = motions.by_landmarks.covariance;
   left.odometry =
       motions.by_odometry.covariance + jacobian * covariance * jacobian.transpose() / kOverlap;
@@ -36,7 +37,7 @@ void JumpWatch::add(const TwoMotions& motions, const CalibrationNumbers& calibra
   if (++count_ < kScans) return;
 
   const Left mean = this->mean();
-  const Eigen::Vector3d jump = -motions.now_twist;  // By a second.
+  const Eigen::Vector3d jump = -motions.now_twist;  // By one second.
   const Eigen::Vector3d weighted = (mean.landmarks + mean.odometry).inverse() * jump;
   const double stated = weighted.dot(mean.value) / std::sqrt(weighted.dot(jump));
   if (!std::isfinite(stated)) return begin_anew();

@@ -1,4 +1,4 @@
-// Whether the scans' clock, or the frame of the landmarks, has jumped against odometry just now.
+// Detects a jump of the scans' clock, or of the landmarks' frame, against odometry.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,29 +9,29 @@
 
 namespace understory::keyframer::joint {
 
-/// Averages what the calibration leaves of the last motions, in the axes of their ends.
+/// Averages the residuals of the last motions after calibration, in the axes of their ends.
 ///
-/// After a jump all motions that span it differ by the same: a clock that jumps by tau by
-/// -tau xi, with the twist xi of the vehicle. Each of them has the noise of two other scans, so
-/// landmarks' noise in the mean of n has an n-th of the variance. The motions are short, so that
-/// wheels add little. How much the mean scatters without a jump is learned as well, as wheels slip
-/// by more than they state.
+/// After a jump all motions across it have the same residual: a clock that jumps by tau gives -tau
+/// xi, with the twist xi of the vehicle. Each of them has the noise of two other scans, so the
+/// landmarks' noise in the mean of n has 1/n of the variance. The motions are short, so wheels add
+/// little error. The scatter of the mean without a jump is estimated as well, since wheels slip by
+/// more than they state.
 class JumpWatch {
  public:
-  /// Scans that a motion goes over, and motions in the mean: no two share a scan.
+  /// Scans per motion, and motions in the mean: no two share a scan.
   static constexpr std::size_t kScans = 5;
 
-  /// Takes the next motion. `calibration`: what is known before it, and its covariance.
-  /// Cost: a few 3 x 3 matrices.
+  /// Adds the next motion. `calibration`: the estimate before it, and its covariance. Cost: a few 3
+  /// x 3 matrices.
   void add(const TwoMotions& motions, const CalibrationNumbers& calibration,
            const CalibrationMatrix& covariance);
-  /// Tracking or odometry has a gap: the mean begins anew.
+  /// Restarts the mean after a gap in tracking or odometry.
   void begin_anew() {
     count_ = 0;
     late_sigmas_ = 0.0;
   }
 
-  /// By how many sigmas the clock seems to have jumped; 0 while the first motions come.
+  /// Size of the jump of the clock in sigmas; 0 until there are enough motions.
   double late_sigmas() const { return late_sigmas_; }
 
   /// Members of a saved state; see common/state.
@@ -41,11 +41,12 @@ class JumpWatch {
   }
 
  private:
-  /// What one motion leaves: x, y [m] and heading [rad] in the axes of its end.
+  /// Residual of one motion: x, y [m] and heading [rad] in the axes of its end.
   struct Left {
     Eigen::Vector3d value = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d landmarks = Eigen::Matrix3d::Zero();  ///< Covariance by its two scans.
-    Eigen::Matrix3d odometry = Eigen::Matrix3d::Zero();   ///< The same, which the motions share.
+    Eigen::Matrix3d landmarks = Eigen::Matrix3d::Zero();  ///< Covariance from its two scans.
+    Eigen::Matrix3d odometry =
+        Eigen::Matrix3d::Zero();  ///< Covariance from odometry, common to overlapping motions.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& self) {
@@ -54,9 +55,9 @@ class JumpWatch {
   };
   Left mean() const;
 
-  std::array<Left, kScans> motions_{};  ///< A ring.
-  std::size_t count_ = 0;               ///< Of motions since it began.
-  double scatter_ = 1.0;                ///< Mean square of late_sigmas(), as stated.
+  std::array<Left, kScans> motions_{};  ///< Ring buffer.
+  std::size_t count_ = 0;               ///< Motions since the start of the mean.
+  double scatter_ = 1.0;                ///< Mean square of late_sigmas().
   double late_sigmas_ = 0.0;
 };
 

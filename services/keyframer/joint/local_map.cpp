@@ -9,24 +9,24 @@
 namespace understory::keyframer::joint {
 namespace {
 
-/// Observations after which a track's mean starts to forget, so that the drift of `local` does not
-/// smear it.
+/// Largest weight of a track's mean [observations]: older ones fade, so that the drift of `local`
+/// does not blur it.
 constexpr double kMaxWeight = 24.0;
 /// A track with fewer observations may be an outlier of its neighbour: it takes a detection only if
-/// that is e^4 times likelier.
+/// that is e^4 times more likely.
 constexpr std::uint32_t kConfirmed = 4;
 constexpr double kReluctance = 8.0;
-/// Scans with both tracks in view that it takes to merge them. Two trunks with detection
+/// Scans with both tracks in view that are needed for a merge. Two trunks with detection
 /// probability 0.8 are never detected together in six scans once in 500 cases.
 constexpr int kMergeViews = 6;
 constexpr double kMaxMergeDistance2_m2 = 4.0;
 constexpr std::size_t kMaxMergeMemory = 4096;
-/// Merges in one scan; others wait for the next one.
+/// Most merges in one scan; others wait for the next one.
 constexpr std::size_t kMostMerges = 64;
-/// More tracks than this around one within whose noise they may be: nothing tells them apart.
+/// With more tracks than this within the noise around one, they cannot be resolved.
 constexpr std::size_t kCrowd = 64;
 constexpr double kBin_m = 1.0;
-/// A track that was not detected again in so many views was noise.
+/// A track that was not detected again in this number of views was noise.
 constexpr int kNoiseViews = 16;
 /// Tracks are kept up to this multiple of the sensor's range.
 constexpr double kKeepRangeFactor = 1.5;
@@ -44,7 +44,7 @@ void take(Track& track, const model::Detection& detection, const geometry::SE2& 
   track.radius_m += (detection.radius_m - track.radius_m) / weight;
 }
 
-/// The tracks around a place that may be within the noise of one there.
+/// The tracks around a position that may be within the noise of a track there.
 class Neighbourhood {
  public:
   Neighbourhood(std::span<const Track> tracks, double gate_sigmas) {
@@ -103,7 +103,7 @@ std::size_t LocalMap::matchable(const geometry::SE2& local_T_vehicle,
   const auto visible = std::count_if(tracks_.begin(), tracks_.end(), [&](const Track& track) {
     return track.observations >= 2 && view.contains(vehicle_T_local * track.position_m);
   });
-  // After the first scan no track has two observations yet: then all of them count.
+  // After the first scan no track has two observations yet: then all are counted.
   return visible > 0 ? static_cast<std::size_t>(visible) : tracks_.size();
 }
 
@@ -127,7 +127,7 @@ std::vector<TrackNumber> LocalMap::add(const model::LandmarkScan& scan,
     track_of[i] = tracks_.back().id;
   }
 
-  // The map stays clean and bounded.
+  // Removes doubles and bounds the map.
   merge_doubles();
   drop_distant(scan.field_of_view.max_range_m, local_T_vehicle.translation());
   drop_excess();
@@ -178,17 +178,16 @@ std::vector<TrackNumber> LocalMap::doubtful() const {
   return result;
 }
 
-/// Within the noise of each other and never detected together, over enough scans that had both in
-/// view.
+/// Within the noise of each other and never detected together, over enough scans with both in view.
 bool LocalMap::is_double(const Track& a, const Track& b) const {
   return within_noise(a, b) && (a.detected_bits & b.detected_bits) == 0 &&
          std::popcount(a.in_view_bits & b.in_view_bits) >= kMergeViews;
 }
 
-/// Two tracks that are doubles of each other are one landmark: the older one.
+/// Merges two tracks that are doubles into the older one.
 void LocalMap::merge_doubles() {
   const Neighbourhood neighbourhood(tracks_, gate_sigmas_);
-  std::vector<std::size_t> moved;  // By a merge: they may have left their neighbourhood.
+  std::vector<std::size_t> moved;  // By a merge, perhaps out of their neighbourhood.
   std::vector<bool> is_gone(tracks_.size(), false);
   for (std::size_t young = 1; young < tracks_.size() && moved.size() < kMostMerges; ++young) {
     const Track& b = tracks_[young];
@@ -248,7 +247,7 @@ std::vector<TrackNumber> LocalMap::resolved(std::span<const TrackNumber> ids) co
   std::ranges::sort(by_old);
   std::vector<TrackNumber> result(ids.begin(), ids.end());
   for (TrackNumber& id : result) {
-    // A track is merged once, into an older one: each step goes on from there.
+    // A track is merged once, into an older one: each chain of merges continues from there.
     for (auto step = by_old.begin(); step != by_old.end();) {
       step = std::ranges::lower_bound(by_old, id, {}, [](const auto& one) { return one.first; });
       if (step == by_old.end() || step->first != id) break;

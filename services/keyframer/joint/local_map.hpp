@@ -1,4 +1,4 @@
-// The landmarks around the vehicle, as the last scans observed them.
+// The landmarks around the vehicle from the last scans.
 #pragma once
 
 #include <cstdint>
@@ -34,38 +34,38 @@ struct Track {
 };
 
 /// A rolling map of tracks in the frame `local`, which drifts slowly. Bounded: tracks behind the
-/// vehicle are dropped, and beyond kMostTracks the oldest of those that the scan did not detect.
+/// vehicle are removed, and beyond kMostTracks the oldest of those that the scan did not detect.
 class LocalMap {
  public:
-  /// More than any scene has; a keyframe's worth of scans with 1,000 false detections each.
+  /// More than any scene has; the scans of a keyframe with 1,000 false detections each.
   static constexpr std::size_t kMostTracks = 8192;
 
   /// Two tracks within `gate_sigmas` of their noise may be one landmark.
   explicit LocalMap(double gate_sigmas) : gate_sigmas_(gate_sigmas) {}
 
-  /// Takes a scan from the pose `local_T_vehicle`. `pairs` (reference = index of a track, observed
-  /// = index of a detection) update tracks; each other detection begins one. Returns the track of
-  /// each detection. Cost O(tracks * log(tracks)), wherever they are.
+  /// Adds a scan from the pose `local_T_vehicle`. `pairs` (reference = index of a track, observed =
+  /// index of a detection) update tracks; each other detection begins one. Returns the track of
+  /// each detection. Cost O(tracks * log(tracks)).
   std::vector<TrackNumber> add(const model::LandmarkScan& scan,
                                std::span<const geometry::PointPair> pairs,
                                const geometry::SE2& local_T_vehicle);
-  /// Drops all tracks. Numbers go on.
+  /// Removes all tracks. Numbers continue.
   void clear();
 
-  /// The tracks as points to register a scan to, in the same order.
+  /// The tracks as points for the registration of a scan, in the same order.
   std::vector<geometry::UncertainPoint> reference_points() const;
-  /// How many tracks a scan from `local_T_vehicle` can match: those in view with two observations
-  /// or more, or all tracks where there is none of these.
+  /// Number of tracks that a scan from `local_T_vehicle` can match: those in view with two
+  /// observations or more, or all tracks if there are none of these.
   std::size_t matchable(const geometry::SE2& local_T_vehicle, const model::FieldOfView& view) const;
 
-  /// The tracks that these were merged into, or they themselves, in the same order.
-  /// O((ids + merged) * log(merged)).
+  /// The tracks that these were merged into, or themselves if unmerged, in the same order. O((ids +
+  /// merged) * log(merged)).
   std::vector<TrackNumber> resolved(std::span<const TrackNumber> ids) const;
-  /// The track with this number; null where it was dropped or merged.
+  /// The track with this number; null if it was removed or merged.
   const Track* find(TrackNumber id) const;
-  /// Those tracks, ascending, that lie within the noise of an older one and were never detected
-  /// together with it: perhaps they are one landmark. So are all in a crowd of which nothing says
-  /// which is which. O(tracks * log(tracks)).
+  /// Tracks, ascending, that lie within the noise of an older one and were never detected together
+  /// with it: they may be the same landmark. All tracks of a crowd that cannot be resolved are
+  /// included. O(tracks * log(tracks)).
   std::vector<TrackNumber> doubtful() const;
 
   /// Members of a saved state; see common/state. The gate is configuration.

@@ -12,18 +12,18 @@
 namespace understory::keyframer::joint {
 namespace {
 
-/// chi^2 of a detection (2 degrees of freedom) beyond which it is not the landmark's: one in
-/// 30,000.
+/// chi^2 of a detection (2 degrees of freedom) beyond which it is no detection of the landmark: one
+/// in 30,000.
 constexpr double kOutlierChi2 = 20.7;
 constexpr int kOutlierRounds = 2;
-/// Of an eigenvalue that is zero, relative to the largest.
+/// Largest eigenvalue that counts as zero, relative to the largest one.
 constexpr double kRounding = 1e-9;
 
-/// Landmarks of a keyframe at most: what it costs to estimate is bounded. No scene has so many.
+/// Most landmarks of a keyframe: bounds the cost of the estimate. No scene has so many.
 constexpr std::size_t kMostLandmarks = 1000;
 
-/// The members' tracks that may be landmarks, ascending: observed often enough and not doubtful. Of
-/// too many those that were observed most often.
+/// The members' tracks that may be landmarks, ascending: observed often enough and not doubtful.
+/// Beyond the limit the most observed ones.
 std::vector<TrackNumber> sure_tracks(std::span<const Member> members, const LocalMap& map,
                                      std::uint32_t min_observations) {
   const std::vector<TrackNumber> doubtful = map.doubtful();
@@ -90,7 +90,7 @@ class BlockBuilder {
   std::map<TrackNumber, std::uint32_t> landmarks_;
 };
 
-/// Removes the observations that do not fit the estimate. Returns false where there are none.
+/// Removes the observations that do not fit the estimate. Returns false if there are none.
 bool remove_outliers(BlockProblem& problem, const BlockEstimate& estimate) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < problem.observations.size(); ++i) {
@@ -114,7 +114,7 @@ bool is_covariance(const Eigen::Matrix<double, N, N>& matrix) {
   return eigenvalues.minCoeff() >= -kRounding * eigenvalues.maxCoeff();
 }
 
-/// Whether all that the keyframe will state are covariances, as they are.
+/// Whether all covariances of the keyframe are valid.
 bool are_covariances(const MemberBlock& block) {
   const BlockEstimate& estimate = block.estimate;
   const auto members = std::ranges::all_of(estimate.centre_T_member, [](const auto& member) {
@@ -127,7 +127,7 @@ bool are_covariances(const MemberBlock& block) {
   return members;
 }
 
-/// The solution, and once more without the observations that do not fit it.
+/// Solves, and solves again without the observations that do not fit.
 void adjust(MemberBlock& block) {
   block.estimate = adjust_block(block.problem);
   for (int round = 0; round < kOutlierRounds; ++round) {
@@ -136,8 +136,8 @@ void adjust(MemberBlock& block) {
   }
 }
 
-/// Whether the IMU is not as its covariances say: the squared errors grow by far more with it than
-/// the numbers that it adds let expect (six standard deviations of chi^2, and by half).
+/// Whether the IMU contradicts its covariances: the squared errors grow with it by far more than
+/// the number of its measurements explains (six standard deviations of chi^2, and by half).
 bool contradicts(const BlockEstimate& with_imu, const BlockEstimate& without) {
   const auto sum = [](const std::vector<double>& chi2) {
     return std::accumulate(chi2.begin(), chi2.end(), 0.0);
@@ -147,7 +147,7 @@ bool contradicts(const BlockEstimate& with_imu, const BlockEstimate& without) {
   return !(growth <= 1.5 * expected + 6.0 * std::sqrt(2.0 * expected));
 }
 
-/// The same solution with the IMU, unless that contradicts what was observed.
+/// Solves with the IMU, unless it contradicts the observations.
 void use_imu(std::span<const Member> members, const BiasEstimate& bias, MemberBlock& block) {
   BlockProblem problem = block.problem;
   problem.bias = bias;
@@ -165,7 +165,7 @@ void use_imu(std::span<const Member> members, const BiasEstimate& bias, MemberBl
   if (!contradicts(with_imu.estimate, block.estimate)) block = std::move(with_imu);
 }
 
-/// Where odometry measured no motion, the tracked one takes its place.
+/// If odometry measured no motion, the tracked one is used.
 void assume_motion(const BlockRules& rules, BlockProblem& problem) {
   const double m2 = rules.motion_sigma_m * rules.motion_sigma_m;
   const double rad2 = rules.motion_sigma_rad * rules.motion_sigma_rad;
@@ -188,7 +188,8 @@ MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
 
   adjust(block);
   if (!block.estimate.determined && members.size() >= 2) {
-    // Few landmarks connect the scans: what they leave open is as sure as a vehicle's motion is.
+    // Few landmarks connect the scans: undetermined directions get the uncertainty of a vehicle's
+    // motion.
     block.problem.observations = observations;
     assume_motion(rules, block.problem);
     adjust(block);

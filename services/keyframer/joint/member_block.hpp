@@ -13,11 +13,11 @@
 
 namespace understory::keyframer::joint {
 
-/// A scan of the keyframe that is being gathered.
+/// A scan of the present keyframe.
 struct Member {
   model::LandmarkScan scan;
   PlacedScan placed;
-  std::optional<geometry::SE2WithCovariance> motion;  ///< Since the scan before, by odometry.
+  std::optional<geometry::SE2WithCovariance> motion;  ///< Since the previous scan, by odometry.
   std::optional<model::InertialMotion> inertial;      ///< The same by the IMU.
 
   /// Members of a saved state; see common/state.
@@ -27,31 +27,30 @@ struct Member {
   }
 };
 
-/// The problem and its solution, with the track behind each landmark.
+/// The problem and its solution, with the track of each landmark.
 struct MemberBlock {
   BlockProblem problem;
-  std::vector<TrackNumber> tracks;  ///< Of each landmark of the problem.
+  std::vector<TrackNumber> tracks;  ///< For each landmark of the problem.
   BlockEstimate estimate;
 };
 
-/// What an estimate of the members takes beside their observations.
+/// Rules of the estimate beside the observations.
 struct BlockRules {
-  int min_observations = 2;        ///< A track with fewer observations is left out.
-  double motion_sigma_m = 0.3;     ///< Of a member's motion that nothing determines, per axis.
+  int min_observations = 2;        ///< A track with fewer observations is excluded.
+  double motion_sigma_m = 0.3;     ///< Of a member's undetermined motion, per axis.
   double motion_sigma_rad = 0.04;  ///< Of its rotation.
   BiasEstimate bias;               ///< Of the IMU, before the first member.
 };
 
-/// Estimates the members' poses and the landmarks of their tracks together. Tracks with fewer than
-/// `min_observations` observations and doubtful ones are left out, and of more than 1000 those that
-/// were observed least; so are outliers, by their chi^2, in at most two rounds. Where landmarks and
-/// odometry leave a motion undetermined, the one that was tracked counts with the sigmas of
-/// `rules`. An IMU counts unless it contradicts what was observed. Precondition: there is a
-/// member.
+/// Estimates the members' poses and the landmarks of their tracks together. Excluded: doubtful
+/// tracks, those with fewer than `min_observations` observations, beyond 1000 tracks the least
+/// observed; and outliers, by their chi^2, in at most two rounds. If landmarks and odometry leave a
+/// motion undetermined, the tracked motion is used with the sigmas of `rules`. An IMU is used
+/// unless it contradicts the observations. Precondition: there is a member.
 MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
                            const BlockRules& rules);
 
-/// Why the estimate is not good enough for a keyframe; nothing where it is.
+/// Reason why the estimate is not good enough for a keyframe; none if it is.
 std::optional<std::string> why_unusable(std::span<const Member> members, const MemberBlock& block);
 
 /// The keyframe of a usable estimate, without sequence and previous_T_base. The caller sets these.

@@ -3,9 +3,10 @@
 namespace understory::keyframer::joint {
 namespace {
 
-/// Error of a comparison that neither covariance has, as a share of way or turn: slip, levelling.
+/// Error of a comparison outside both covariances, as a share of translation or rotation: slip,
+/// levelling.
 constexpr double kModelShare = 0.01;
-/// The same of a turn [rad]: levelling, the bias's walk.
+/// Likewise of a rotation [rad]: levelling, the bias's walk.
 constexpr double kTurnModel_rad = 5e-4;
 
 double squared(double x) { return x * x; }
@@ -39,7 +40,7 @@ TurnDifference turn_difference(const TwoMotions& motions, double overlapping) {
                          squared(kModelShare * turn);
   result.jacobian.setZero();
   result.jacobian(kLate) = motions.then_twist.z() - motions.now_twist.z();
-  // Odometry has the bias in it: by landmarks the turn is so much smaller.
+  // Odometry contains the bias: the rotation by landmarks is smaller by it.
   result.jacobian(kGyroBias) = -motions.seconds;
   return result;
 }

@@ -5,7 +5,7 @@
 namespace understory::keyframer::joint {
 namespace {
 
-/// Odometry is never trusted below this [m^2, rad^2]: registration needs a guess that can move.
+/// Least variance of odometry [m^2, rad^2]: registration must be able to move its guess.
 constexpr double kMotionFloor = 1e-8;
 
 std::vector<geometry::UncertainPoint> observed_points(const model::LandmarkScan& scan) {
@@ -57,7 +57,7 @@ std::optional<geometry::Registration> ScanTracker::locate(
   geometry::RegistrationParameters registration;
   registration.gate_sigmas = parameters_.gate_sigmas;
 
-  // Odometry places the scan even where there is nothing to match.
+  // Odometry gives the pose of a scan even without any match.
   if (motion) {
     const geometry::SE2WithCovariance guess{
         local_T_vehicle_ * motion->mean,
@@ -65,7 +65,7 @@ std::optional<geometry::Registration> ScanTracker::locate(
     return register_points(reference, observed, guess, registration);
   }
 
-  // Without it the last motion repeats, or the heading is searched; the result must fit.
+  // Without odometry the last motion is repeated, or headings are tried; the result must fit.
   const geometry::StepModel step{parameters_.motion_sigma_m, parameters_.motion_sigma_rad,
                                  parameters_.max_rotation_rad};
   geometry::Registration found =

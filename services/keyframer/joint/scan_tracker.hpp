@@ -1,5 +1,4 @@
-// Follows landmarks from scan to scan in a frame that drifts slowly: which detection is which
-// landmark.
+// Tracks landmarks from scan to scan, in a frame that drifts slowly.
 #pragma once
 
 #include <optional>
@@ -12,10 +11,10 @@
 
 namespace understory::keyframer::joint {
 
-/// Where a scan was made, and the track of each of its detections.
+/// The pose of a scan, and the track of each of its detections.
 struct PlacedScan {
   geometry::SE2 local_T_vehicle;
-  std::vector<TrackNumber> tracks;  ///< Per detection; tracks that the scan began included.
+  std::vector<TrackNumber> tracks;  ///< Per detection; including new tracks.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -25,25 +24,25 @@ struct PlacedScan {
 };
 
 /// Registers each scan to a rolling map of the last ones. It works without odometry, and through
-/// rotations between scans that no motion model predicts: where the predicted pose does not fit,
-/// the headings around it are tried.
+/// rotations between scans that no motion model predicts: if the predicted pose does not fit, the
+/// headings around it are tried.
 class ScanTracker {
  public:
   /// An empty map: the first scan starts it.
   explicit ScanTracker(const JointKeyframerParameters& parameters)
       : parameters_(parameters), map_(parameters.gate_sigmas) {}
 
-  /// Takes the next scan. `motion`: of the vehicle since the last scan (last_T_this), where
-  /// odometry measured it. Returns nothing where the scan matches too little of the map; then
-  /// nothing has changed. With odometry a scan is always placed.
+  /// Adds the next scan. `motion`: of the vehicle since the last scan (last_T_this), if odometry
+  /// measured it. Returns none, without change, if the scan has too few matches in the map. With
+  /// odometry a scan always gets a pose.
   std::optional<PlacedScan> add(const model::LandmarkScan& scan,
                                 const std::optional<geometry::SE2WithCovariance>& motion);
-  /// Drops the map and starts `local` at this scan.
+  /// Clears the map and starts `local` at this scan.
   PlacedScan restart(const model::LandmarkScan& scan);
 
-  /// The tracks as they are after the last scan.
+  /// The tracks after the last scan.
   const LocalMap& map() const { return map_; }
-  /// Scans since tracking began (anew), the last one included.
+  /// Number of scans since the last (re)start of tracking, including the last one.
   std::uint64_t scans() const { return scans_; }
 
   /// Members of a saved state; see common/state.
