@@ -6,7 +6,7 @@
 
 namespace understory::lidar_imu_input {
 
-/// Where the wheels are: scalars of `CarGeometry::axle_T_vehicle`, put together after loading.
+/// Position of the wheels: scalars of `CarGeometry::axle_T_vehicle`, combined after loading.
 struct AxlePlace {
   double x_m = 0.0;
   double y_m = 0.0;

@@ -8,7 +8,7 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-/// A step this much longer than usual has a gap in it.
+/// A step longer than usual by this factor contains a gap.
 constexpr double kGapFactor = 1.5;
 
 bool is_ordered(Sensor sensor) { return sensor != Sensor::kSweep && sensor != Sensor::kGnss; }
@@ -25,7 +25,7 @@ std::optional<InputFault> ArrivalOrder::add(RawReading reading, const InputGuard
   const Sensor sensor = sensor_of(reading);
   const model::Utime end = guard.on_stage_time(sensor, end_of(reading));
 
-  // A stamp that is not believed must not end the others' waiting.
+  // A stamp that is not trusted must not end the waiting of other sensors.
   if (sensor != Sensor::kGnss && guard.is_believable(end)) {
     newest_ = std::max(end, newest_.value_or(end));
     lasers_[index_of(sensor)] = {end, *newest_ - end};
@@ -35,7 +35,7 @@ std::optional<InputFault> ArrivalOrder::add(RawReading reading, const InputGuard
     return std::nullopt;
   }
 
-  // Behind those with an earlier stamp; at the same one the IMU is first.
+  // Sorted by stamp; at equal stamps the IMU is first.
   const auto key = [&guard](const RawReading& one) {
     return std::pair(stage_stamp(one, guard), sensor_of(one));
   };
@@ -74,7 +74,7 @@ bool ArrivalOrder::may_go(const RawReading& reading, const InputGuard& guard) co
   // Before the first one others may have been sent.
   const auto last = guard.last(sensor);
   if (!last) return false;
-  // Late ones and jumps are the guard's.
+  // Late ones and jumps are left to the guard.
   if (utime <= *last || seconds_between(*last, utime) > guard.longest_step_s(sensor)) return true;
 
   if (!is_next(reading, *last, guard)) return false;
@@ -83,7 +83,7 @@ bool ArrivalOrder::may_go(const RawReading& reading, const InputGuard& guard) co
          !misses_laser(Sensor::kScan, guard);
 }
 
-/// Whether nothing is missing between the sensor's reading before and this one.
+/// Whether no reading is missing between the sensor's previous one and this one.
 bool ArrivalOrder::is_next(const RawReading& reading, model::Utime last,
                            const InputGuard& guard) const {
   const Sensor sensor = sensor_of(reading);
@@ -107,18 +107,19 @@ bool ArrivalOrder::misses_motion(Sensor sensor, model::Utime utime, const InputG
   const bool is_due = sensor == Sensor::kImu ? ahead_us > period_us + half_us : ahead_us >= half_us;
   if (!is_due) return false;
 
-  // It is there, and later.
+  // It has arrived, with a later stamp.
   const auto held = std::ranges::find_if(
       waiting_, [other](const HeldReading& one) { return sensor_of(one.reading) == other; });
   return held == waiting_.end() || !is_next(held->reading, last, guard);
 }
 
-/// Whether motion is known up to the end of a revolution that has not come: what follows it waits.
+/// Whether motion is known up to the end of a revolution that has not arrived: later readings wait
+/// for it.
 bool ArrivalOrder::misses_laser(Sensor laser, const InputGuard& guard) const {
   const Laser& latest = lasers_[index_of(laser)];
   const double period_us = guard.period_us(laser);
   if (!latest.end || period_us == 0.0 || !guard.is_live(laser)) return false;
-  // Revolutions that always come later are not waited for.
+  // Revolutions that are always later are not waited for.
   if (static_cast<double>(latest.late_us) * 1e-6 > parameters_.reorder_s) return false;
   const model::Utime due = *latest.end + static_cast<model::Utime>(period_us);
   return guard.has_motion_until(due, parameters_.reorder_s);

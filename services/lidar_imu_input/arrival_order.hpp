@@ -1,4 +1,4 @@
-// Messages that the network brought out of order, in the order of their stamps again.
+// Sorts messages that the network delivered out of order by their stamps.
 #pragma once
 
 #include <array>
@@ -10,22 +10,22 @@
 
 namespace understory::lidar_imu_input {
 
-/// Samples of IMU, wheels and one-plane lasers wait where one before them is missing, of their own
-/// sensor, of the other one that measures motion, or the sweep that they follow; for `reorder_s` of
-/// the sensors' time at most. So readings that come up to that late are used as if they had come in
-/// time, to the bit. Samples that come in order do not wait, but for a sweep that is on its way.
+/// A sample of IMU, wheels or a one-plane laser waits if an earlier one is missing: of its own
+/// sensor, of the other motion sensor, or the preceding sweep; for at most `reorder_s` of the
+/// sensors' time. So readings up to that late give bitwise the same result as in time. Samples in
+/// order do not wait, except for a sweep under way.
 class ArrivalOrder {
  public:
   /// `reorder_s`: the longest wait; 0 = none.
   explicit ArrivalOrder(const FaultParameters& parameters) : parameters_(parameters) {}
 
-  /// Takes a reading. A fault where its stamp is one that waits already.
+  /// Adds a reading. A fault if a reading with the same stamp waits already.
   std::optional<InputFault> add(RawReading reading, const InputGuard& guard);
-  /// The next one to be used, if there is one (or `everything`). Each is to be used before the next
-  /// is asked for: `guard` knows what came last.
+  /// The next reading to use, if it need not wait (or `everything`). Use each before the next call:
+  /// `guard` keeps the last one used.
   std::optional<RawReading> next(const InputGuard& guard, bool everything);
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.waiting_, self.newest_, self.sequences_);
@@ -36,7 +36,7 @@ class ArrivalOrder {
   /// The latest reading of a laser.
   struct Laser {
     std::optional<model::Utime> end;
-    model::Utime late_us = 0;  ///< How far the others were then.
+    model::Utime late_us = 0;  ///< Delay behind the other sensors at its arrival.
   };
   bool may_go(const RawReading& reading, const InputGuard& guard) const;
   bool is_next(const RawReading& reading, model::Utime last, const InputGuard& guard) const;
@@ -44,9 +44,9 @@ class ArrivalOrder {
   bool misses_laser(Sensor laser, const InputGuard& guard) const;
 
   FaultParameters parameters_;
-  std::deque<RawReading> ready_;     ///< Of sensors that do not wait, but at the start; not saved.
-  std::deque<HeldReading> waiting_;  ///< In the order of their stamps.
-  std::optional<model::Utime> newest_;               ///< Of all sensors, waiting ones too.
+  std::deque<RawReading> ready_;  ///< Of sensors that do not wait, except at the start; not saved.
+  std::deque<HeldReading> waiting_;     ///< In order of their stamps.
+  std::optional<model::Utime> newest_;  ///< Of all sensors, including waiting readings.
   std::array<std::uint64_t, kSensors> sequences_{};  ///< Of the latest one used.
   std::array<Laser, kSensors> lasers_;               ///< Of kSweep and kScan.
 };

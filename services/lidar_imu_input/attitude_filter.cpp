@@ -50,7 +50,7 @@ Eigen::Matrix<double, 2, 3> level_of_attitude(const Eigen::Quaterniond& world_Q_
   return tilt_of(world_Q_vehicle).toRotationMatrix().topRows<2>();
 }
 
-/// A covariance that is negative by rounding only.
+/// Removes negative eigenvalues from rounding.
 Eigen::Matrix2d without_negative(const Eigen::Matrix2d& covariance) {
   const geometry::PrincipalAxes parts =
       geometry::principal_axes(0.5 * (covariance + covariance.transpose()));
@@ -92,8 +92,8 @@ void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3
   step.block<3, 3>(3, 6) = -cross(velocity_) * seconds;
   step.block<3, 3>(3, 9) = -Eigen::Matrix3d::Identity() * seconds;
 
-  // Noise. A scale error of the gyro acts like noise of its power over a rotation of about a
-  // second.
+  // Noise. A scale error of the gyro is modelled as noise of the same power over a rotation of
+  // about a second.
   const double gyro_noise = saturated ? imu_.saturation_gyro_noise : imu_.gyro_noise;
   const double force_noise = saturated ? imu_.saturation_force_noise : imu_.force_noise;
   const Eigen::Matrix3d lever = cross(velocity_);
@@ -133,11 +133,11 @@ void AttitudeFilter::update(const Row& row, double residual, double variance,
   const Eigen::Matrix<double, 13, 1> gain = kept * spread / total;
   const Eigen::Matrix<double, 13, 1> error = gain * residual;
 
-  // For any gain, as Joseph's form.
+  // For any gain, like Joseph's form.
   covariance_ +=
       total * gain * gain.transpose() - gain * spread.transpose() - spread * gain.transpose();
   with_mark_ -= gain * (row * with_mark_).eval();
-  // Its correction is what the estimate was off by, turned round.
+  // Its correction is the negative error of the estimate.
   const Eigen::RowVector2d of_rest = row * with_rest_;
   rest_.error_rad -= of_rest.transpose() * (residual / total);
   rest_.covariance -= of_rest.transpose() * of_rest / total;

@@ -89,8 +89,8 @@ void DeadReckoning::update(const Row& row, double residual, double variance, boo
   const Eigen::Matrix<double, 8, 1> spread = covariance_ * row.transpose();
   const double total = row.dot(spread) + variance;
 
-  // The position never jumps, the heading only where it is measured: a gain that is not optimal
-  // needs Joseph's form.
+  // The position never jumps, the heading only if it is measured: a gain that is not optimal needs
+  // Joseph's form.
   Eigen::Matrix<double, 8, 1> gain = spread / total;
   gain.head<2>().setZero();
   if (!moves_heading) gain(2) = 0.0;

@@ -1,4 +1,4 @@
-// RAW_POSE: strapdown integration in the plane, velocity corrected from outside.
+// RAW_POSE: strapdown integration in the plane, with external velocity corrections.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@
 namespace understory::lidar_imu_input {
 
 /// Pose (in `odom`), velocity (in `vehicle_level`) and biases from levelled samples. The pose
-/// drifts and never jumps: measurements change velocity and biases only; the correlation of pose
+/// drifts and never jumps: measurements change only velocity and biases; the correlation of pose
 /// errors with them is kept in the covariance.
 class DeadReckoning {
  public:
@@ -24,25 +24,25 @@ class DeadReckoning {
 
   /// From sample a to sample b, trapezoidal rule.
   void propagate(const LevelSample& a, const LevelSample& b);
-  /// The same where the pose has been moved over this time already: velocity and biases alone.
+  /// Likewise for a time over which the pose was moved already: only velocity and biases.
   void propagate_velocity(const LevelSample& a, const LevelSample& b);
-  /// Motion over a time that no sample covers, in frame `vehicle_level`.
+  /// Applies a motion over a time without samples, in frame `vehicle_level`.
   void bridge(const geometry::SE2WithCovariance& motion);
-  /// The velocity becomes this one, independent of everything else.
+  /// Sets the velocity, independent of all other errors.
   void set_velocity(const LevelVelocity& velocity);
   /// Updates with a velocity component: `residual_mps` = measured - predicted value of
   /// direction . (velocity + yaw rate x at); `direction` unit, `at` [m].
   void add_velocity(const Eigen::Vector2d& direction, const Eigen::Vector2d& at,
                     double residual_mps, double sigma_mps);
-  /// The velocity is zero; the gyro's bias comes by set_gyro_bias().
+  /// Zero velocity; set_gyro_bias() gives the gyro's bias.
   void add_standstill(double velocity_sigma_mps);
   /// Updates with a heading: `residual_rad` = measured - predicted (GNSS aided only: the heading
   /// jumps).
   void add_heading(double residual_rad, double sigma_rad);
-  /// The bias of the yaw rate becomes this one, independent of everything else.
+  /// Sets the bias of the yaw rate, independent of all other errors.
   void set_gyro_bias(double bias_rad_s, double sigma_rad_s);
-  /// Velocity and biases become the filter's. `then_velocity` [m/s], `then_heading` [rad]: the dead
-  /// reckoning's own at the correction's stamp; the difference is carried to now.
+  /// Sets velocity and biases to the filter's. `then_velocity` [m/s], `then_heading` [rad]: the
+  /// dead reckoning's own at the correction's stamp; the difference is applied at the present time.
   void correct(const model::VelocityCorrection& correction, const Eigen::Vector2d& then_velocity,
                double then_heading);
 
@@ -55,7 +55,7 @@ class DeadReckoning {
   /// Of yaw rate [rad/s] and force along level x, y [m/s^2].
   const model::InertialBias& bias() const { return bias_; }
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.pose_, self.velocity_, self.bias_, self.covariance_);
@@ -64,7 +64,7 @@ class DeadReckoning {
  private:
   using Row = Eigen::Matrix<double, 1, 8>;
   void update(const Row& row, double residual, double variance, bool moves_heading);
-  /// Of the pose, which then has nothing in common with velocity and biases.
+  /// Sets the pose's covariance, and its correlation with velocity and biases to zero.
   void set_pose_covariance(const Eigen::Matrix3d& covariance);
 
   ImuParameters imu_;

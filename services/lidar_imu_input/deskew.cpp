@@ -69,7 +69,7 @@ void times_from_azimuth(model::PointSweep& sweep, double revolution_s, bool cloc
   for (model::SweepPoint& point : sweep.points) {
     float angle = sign * std::atan2(point.y_m, point.x_m) - start;
     if (angle < 0.0F) angle += kTurn;
-    // Beams of one firing look to slightly different azimuths: a little before the start.
+    // Beams of one firing have slightly different azimuths: slightly before the start.
     if (angle > kTurn - 0.02F) angle = 0.0F;
     point.time_s = static_cast<float>(revolution_s) * angle / kTurn;
   }
@@ -103,7 +103,7 @@ model::PointSweep sweep_of(const model::PlanarScan& scan) {
 
 namespace {
 
-/// Moves each point between the two steps that its time lies between.
+/// Transforms each point, interpolating between the two steps around its time.
 void move_points(model::PointSweep& sweep, const std::vector<Motion>& table, float shift_s) {
   const std::size_t steps = table.size();
   for (model::SweepPoint& point : sweep.points) {
@@ -138,7 +138,7 @@ DeskewedSweep deskew(model::PointSweep raw, model::Utime utime, const MotionHist
   const MotionState target = known.value_or(MotionState{});
   result.had_motion = known && raw.has_times && history.at(raw.utime);
 
-  // Where the sensor was, millisecond by millisecond.
+  // Pose of the sensor at each millisecond.
   const auto last_s =
       static_cast<float>(static_cast<double>(end_of_revolution(raw) - raw.utime) * 1e-6);
   const auto steps = static_cast<std::size_t>(std::max(0.0F, last_s) / kStep_s) + 2;
@@ -147,7 +147,7 @@ DeskewedSweep deskew(model::PointSweep raw, model::Utime utime, const MotionHist
       motions(raw, target, result.had_motion ? history : still, mount, steps);
   const auto shift_s = static_cast<float>(static_cast<double>(utime - raw.utime) * 1e-6);
 
-  // In place: a revolution of many beams is megabytes.
+  // In place: a revolution of many beams has megabytes.
   model::PointSweep& sweep = result.sweep;
   sweep = std::move(raw);
   sweep.utime = utime;

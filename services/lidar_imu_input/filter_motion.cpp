@@ -21,7 +21,7 @@ void FilterMotion::add(const model::EkfPose& pose) {
   if (begins) poses_.clear();
   reset_counter_ = pose.reset_counter;
   poses_.push_back({pose.utime, at.x(), at.y(), at.theta()});
-  // One pose is kept that is as old as the baseline.
+  // One pose as old as the baseline is kept.
   while (poses_.size() > 2 && seconds_between(poses_[1].utime, pose.utime) >= kBaseline_s)
     poses_.pop_front();
 }

@@ -1,4 +1,4 @@
-// How the vehicle moves by the filter's poses: for sweeps of a laser without any other sensor.
+// Motion of the vehicle from the filter's poses: for sweeps of a laser without any motion sensor.
 #pragma once
 
 #include <deque>
@@ -9,27 +9,27 @@
 
 namespace understory::lidar_imu_input {
 
-/// The filter's latest poses, taken as one even motion (constant twist, as in KISS-ICP, Vizzo et
-/// al. 2023). A landmark is measured at any time of the revolution: without this it seems to move
-/// by the distance driven in a tenth of a second, forward on one side and backward on the other,
-/// which rotates the map.
+/// Motion at constant twist through the filter's latest poses (as in KISS-ICP, Vizzo et al. 2023).
+/// A landmark can be measured at any time of the revolution: without this motion it is displaced by
+/// the distance driven in 0.1 s, forward on one side and backward on the other, which rotates the
+/// map.
 class FilterMotion {
  public:
-  /// Takes EKF_POSE. Ignored where it is not finite or the filter used fewer than 3 landmarks: then
-  /// it only predicts. After a reset, a step back in time or a gap the poses before are forgotten.
+  /// Adds EKF_POSE. Ignored if it is not finite or the filter used fewer than 3 landmarks: then it
+  /// only predicts. After a reset, a step back in time or a gap, earlier poses are dropped.
   void add(const model::EkfPose& pose);
-  /// Motion at `stamp`, from which at() of a history goes back over the revolution. None where no
-  /// pose came within kLongest_s before, or the poses cover less than half of kBaseline_s.
+  /// Motion at `stamp`; at() of a history extrapolates it back over the revolution. None if there
+  /// is no pose within kLongest_s before, or the poses cover less than half of kBaseline_s.
   std::optional<MotionState> at(model::Utime stamp) const;
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.poses_, self.reset_counter_);
   }
 
   static constexpr double kBaseline_s = 0.3;  ///< Averages the poses' noise.
-  static constexpr double kLongest_s = 1.0;   ///< Poses farther apart are not joined.
+  static constexpr double kLongest_s = 1.0;  ///< Poses at a larger distance in time are not joined.
 
  private:
   /// ekf_map_T_vehicle.

@@ -13,11 +13,11 @@ namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::size_t kFewestQuiet = 5;
-/// Of an accelerometer's scale and bias, together.
+/// Of an accelerometer's scale and bias together.
 constexpr double kScaleTolerance = 0.1;
-/// Less is no gravity [m/s^2].
+/// A smaller mean is no gravity [m/s^2].
 constexpr double kNoGravity_mps2 = 0.5;
-/// No vehicle stands on such a slope.
+/// Steeper than any slope on which a vehicle stands.
 constexpr double kSteepest_rad = 30.0 * std::numbers::pi / 180.0;
 
 bool is_near(double value, double expected) {
@@ -63,7 +63,7 @@ bool GravityCheck::is_quiet() const {
   const auto count = static_cast<double>(window_.size());
   const Eigen::Array<double, 6, 1> mean = sum / count;
   const Eigen::Array<double, 6, 1> sigma = (squares / count - mean.square()).max(0.0).sqrt();
-  // Of a wrong unit the noise is in that unit, too.
+  // With a wrong unit the noise has that unit, too.
   const double unit = std::max(1.0, mean.tail<3>().matrix().norm() / kGravity_mps2);
   return sigma.head<3>().maxCoeff() <= quiet_.gyro_sigma_rad_s &&
          mean.head<3>().abs().maxCoeff() <= quiet_.gyro_mean_rad_s &&
@@ -84,7 +84,7 @@ GravityVerdict GravityCheck::judge() const {
 
 std::string GravityCheck::text() const {
   using enum GravityVerdict;
-  // Asked with every sample.
+  // Called with every sample.
   if (verdict_ == kUnknown || verdict_ == kRight || verdict_ == kInG) return "";
 
   const Eigen::Vector3d& f = mean_mps2_;

@@ -1,4 +1,4 @@
-// Whether an IMU at rest measures gravity as it must: unit, sign and mounting.
+// Checks the gravity measured by an IMU at rest: unit, sign and mounting.
 #pragma once
 
 #include <deque>
@@ -9,43 +9,43 @@
 
 namespace understory::lidar_imu_input {
 
-/// What a quiet IMU shows of gravity.
+/// Result of the check.
 enum class GravityVerdict : std::uint8_t {
   kUnknown,     ///< It was not quiet yet.
   kRight,       ///< 9.81 m/s^2, upwards in frame vehicle.
-  kInG,         ///< 1: the unit is g. Certain, and taken.
-  kPointsDown,  ///< The IMU is upside down, or the sign is turned round.
-  kTilted,      ///< Far from upwards: the mounting is not as configured.
-  kMissing,     ///< Gravity was taken out before.
+  kInG,         ///< Magnitude 1: the unit is g. Certain, and converted.
+  kPointsDown,  ///< The IMU is upside down, or the sign is reversed.
+  kTilted,      ///< Far from upwards: the mounting differs from the configuration.
+  kMissing,     ///< Gravity was subtracted before.
   kWrongScale,  ///< Another magnitude.
 };
 
-/// Looks at half a second of samples at a time. A quiet vehicle need not be stationary: it is not
-/// accelerated, and gravity is all that the accelerometer feels.
+/// Examines half a second of samples at a time. A quiet vehicle need not be stationary: it is not
+/// accelerated, so the accelerometer measures only gravity.
 class GravityCheck {
  public:
-  /// `mount`: of the IMU; what is quiet: as for a standstill.
+  /// `mount`: of the IMU; `quiet`: limits as for a standstill.
   GravityCheck(const SensorMount& mount, const StandstillParameters& quiet)
       : mount_(mount), quiet_(quiet) {}
 
-  /// Takes a sample in frame sensor as it came. True where this one shows that the unit is g: what
-  /// was made of the samples before is wrong.
+  /// Adds a raw sample in frame sensor. True if it proves that the unit is g: results from earlier
+  /// samples are then wrong.
   bool add(const model::ImuSample& raw);
-  /// Takes the force of a sample to m/s^2.
+  /// Factor that converts a sample's force to m/s^2.
   double scale() const { return scale_; }
   /// Of the latest quiet samples.
   GravityVerdict verdict() const { return verdict_; }
-  /// Whether what it measures is no level of the vehicle.
+  /// Whether its samples give no level of the vehicle.
   bool is_useless() const {
     return verdict_ != GravityVerdict::kUnknown && verdict_ != GravityVerdict::kRight &&
            verdict_ != GravityVerdict::kInG;
   }
   /// Their mean force, frame sensor.
   const Eigen::Vector3d& mean_mps2() const { return mean_mps2_; }
-  /// For a person: what is wrong, and the setting that mends it; empty where nothing is.
+  /// For a person: the fault, and the setting that corrects it; empty without a fault.
   std::string text() const;
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.window_, self.scale_, self.verdict_, self.mean_mps2_);

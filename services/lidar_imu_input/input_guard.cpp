@@ -11,7 +11,7 @@ namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kNeverSilent_s = 1e9;
-/// So many points of a sweep are compared with those of the sweep before.
+/// Number of points of a sweep that are compared with the previous sweep.
 constexpr std::size_t kComparedPoints = 64;
 
 }  // namespace
@@ -39,7 +39,7 @@ InputGuard::InputGuard(const FaultParameters& parameters, const ImuParameters& i
       expected_(expected),
       states_(kSensors, State{SensorClock(parameters)}) {}
 
-/// Of the others but GNSS, with the time at which they go on after a pause.
+/// Newest stamp of all sensors but this one and GNSS, including the restart time after a pause.
 std::optional<model::Utime> InputGuard::newest_but(Sensor sensor) const {
   std::optional<model::Utime> newest = resumed_;
   for (std::size_t i = 0; i < states_.size(); ++i) {
@@ -73,8 +73,8 @@ bool InputGuard::has_others(Sensor sensor) const {
   return false;
 }
 
-/// Clocks that jumped together stay together: what one sensor's first sample misses of another's
-/// must not become a time offset between them.
+/// Clocks that jumped together get the same offset: the delay between two sensors' first samples
+/// must not become an offset between them.
 void InputGuard::share_jump(Sensor sensor, model::Utime raw, std::optional<model::Utime> before) {
   SensorClock& clock = state(sensor).clock;
   for (const State& other : states_) {
@@ -165,7 +165,7 @@ bool InputGuard::is_saturated(const model::ImuSample& sample,
 double InputGuard::silent_s(Sensor sensor) const {
   switch (sensor) {
     case Sensor::kGnss:
-      return kNeverSilent_s;  // a forest has no sky
+      return kNeverSilent_s;  // a forest blocks the sky
     case Sensor::kSweep:
     case Sensor::kScan:
       return parameters_.sweep_silent_s;

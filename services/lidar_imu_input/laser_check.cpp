@@ -12,32 +12,32 @@ namespace {
 
 constexpr double kLaserDegree_rad = std::numbers::pi / 180.0;
 
-/// Points between these distances from the sensor show the ground.
+/// Points within these distances from the sensor can be ground.
 constexpr float kNearest_m = 1.0F;
 constexpr float kFarthest_m = 20.0F;
 constexpr std::size_t kMostPoints = 400;
 constexpr int kTrials = 60;
 /// Points of a sweep whose azimuths are compared: about a degree apart.
 constexpr std::size_t kMostTurns = 400;
-/// Distance from the plane of a point of it: grass, bumps.
+/// Largest distance of a point from its plane: grass, bumps.
 constexpr double kOnPlane_m = 0.12;
 constexpr double kShareOnPlane = 0.33;
 /// Steeper planes are walls.
 constexpr double kNoWall = 0.64;
 
-/// Planes that are forgotten in about so many more.
+/// Number of planes over which older ones are forgotten.
 constexpr double kRemembered = 20.0;
 constexpr double kMostlyAbove = 0.8;
-/// A ceiling is at another distance than the ground should be.
+/// A ceiling has another distance than the expected ground.
 constexpr double kHeightTolerance_m = 0.3;
 constexpr double kHeightTolerance_share = 0.1;
-/// Apart so far planes are of other ground.
+/// Planes this far apart are of different ground.
 constexpr double kApart_m = 2.0;
 constexpr double kFewest = 8.0;
 constexpr double kSigmas = 5.0;
 constexpr double kMostTilt_rad = 3.0 * kLaserDegree_rad;
 constexpr double kMostHeightError_m = 0.15;
-/// A mean over the last 100 m or so.
+/// Limits the mean to about the last 100 m.
 constexpr double kMostCount = 50.0;
 
 std::optional<GroundPlane> plane_through(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
@@ -55,7 +55,7 @@ bool is_on(const GroundPlane& plane, const Eigen::Vector3d& point_m,
   return std::abs(plane.normal.dot(sensor_m - point_m) - plane.distance_m) < kOnPlane_m;
 }
 
-/// Least squares through the points on it.
+/// Least squares through the points of the plane.
 GroundPlane refined(const GroundPlane& plane, std::span<const Eigen::Vector3d> points_m,
                     const Eigen::Vector3d& sensor_m) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -75,7 +75,7 @@ GroundPlane refined(const GroundPlane& plane, std::span<const Eigen::Vector3d> p
   return {normal, normal.dot(sensor_m - mean)};
 }
 
-/// Enough of the points that may be ground, evenly over the revolution.
+/// Points that may be ground, evenly over the revolution.
 std::vector<Eigen::Vector3d> sample_of(const model::PointSweep& sweep) {
   std::vector<Eigen::Vector3d> near_m;
   const Eigen::Vector3f sensor_m = sweep.sensor_position_m.cast<float>();
@@ -96,7 +96,7 @@ std::vector<Eigen::Vector3d> sample_of(const model::PointSweep& sweep) {
 std::optional<GroundPlane> find_ground(std::span<const Eigen::Vector3d> points_m,
                                        const Eigen::Vector3d& sensor_m) {
   if (points_m.size() < 30) return std::nullopt;
-  // The same trials for each sweep.
+  // The same random trials for each sweep.
   std::uint32_t state = 1;
   const auto any = [&]() -> const Eigen::Vector3d& {
     state = state * 1664525U + 1013904223U;
@@ -135,7 +135,7 @@ void LaserCheck::add_raw(const model::PointSweep& raw) {
     time_s = point.time_s;
   }
 
-  // What does not turn once round says nothing.
+  // Points over less than half a turn give no direction.
   const bool is_round = std::abs(turned) > std::numbers::pi;
   turn_ += ((is_round ? std::copysign(1.0, turned) : 0.0) - turn_) / kRemembered;
   judge();

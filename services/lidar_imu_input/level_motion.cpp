@@ -30,7 +30,8 @@ void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b
   forward.block<2, 1>(3, 0) = 0.5 * turned * dt * dt;
   forward.block<2, 2>(3, 1) = Eigen::Matrix2d::Identity() * dt;
 
-  // Of the step's mean rate and force (the force rotates by half of the step's own rotation).
+  // Jacobian by the step's mean rate and force (the force rotates by half of the step's own
+  // rotation).
   Eigen::Matrix<double, 5, 3> input = Eigen::Matrix<double, 5, 3>::Zero();
   input(0, 0) = dt;
   input.block<2, 1>(1, 0) = 0.5 * turned * dt * dt;
@@ -55,8 +56,8 @@ void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b
   sum.seconds += dt;
 }
 
-/// The IMU's lever is taken out with the rate at both ends: their noise, times the lever, is noise
-/// of the velocity there; that of the start moves the end's position.
+/// The lever force is subtracted with the rates at both ends: their noise times the lever is noise
+/// of the velocity there; that at the start moves the end's position.
 void add_lever_noise(model::Preintegration& sum, const ImuParameters& imu) {
   const double at_end = square(imu.gyro_noise) / kLeverBaseline_s *
                         (square(imu.mount.x_m) + square(imu.mount.y_m) + square(imu.mount.z_m));
@@ -75,8 +76,8 @@ struct DriveStep {
   bool is_saturated = false;
 };
 
-/// Motion of the axle's middle over one step. Errors that last for a time tau and act for
-/// dt << tau have the power tau * dt.
+/// Motion of the axle's middle over one step. Errors with a correlation time tau, acting for dt <<
+/// tau, have the power tau * dt.
 geometry::SE2WithCovariance driven(const DriveStep& step, double scale_sigma,
                                    const LidarImuInputParameters& parameters,
                                    const YawRateBias& bias) {
@@ -170,7 +171,7 @@ std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& 
     motion = compound(motion, driven(step, speeds.latest().scale_sigma, parameters, bias));
   }
 
-  // Each end of the interval is off by the stamps' jitter; the gyro's yaw is not the wheels'.
+  // Each end of the interval has the stamps' jitter; the gyro's yaw is independent of the wheels.
   Eigen::Vector3d twist = motion.mean.Log() / seconds_between(from, to);
   twist.z() = 0.0;
   motion.covariance +=

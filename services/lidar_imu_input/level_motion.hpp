@@ -1,4 +1,4 @@
-// The IMU's samples in `vehicle_level`, and what becomes of them between two stamps.
+// The IMU's samples in `vehicle_level`, and their integration between two stamps.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,13 +17,13 @@ inline Eigen::Matrix2d planar_rotation(double angle_rad) {
   return Eigen::Rotation2Dd(angle_rad).toRotationMatrix();
 }
 
-/// One sample of the IMU after levelling: nothing is subtracted but gravity.
+/// One levelled sample of the IMU: only gravity is subtracted.
 struct LevelSample {
   model::Utime utime = 0;
   double yaw_rate_rad_s = 0.0;                           ///< Of the heading.
   Eigen::Vector2d force_mps2 = Eigen::Vector2d::Zero();  ///< Along level x and y.
   double pitch_cosine = 1.0;                             ///< Of the vehicle.
-  bool is_saturated = false;                             ///< Samples before it were left out.
+  bool is_saturated = false;                             ///< Samples before it were omitted.
 
   /// For saving and loading.
   template <class Archive, class Self>
@@ -32,24 +32,23 @@ struct LevelSample {
   }
 };
 
-/// The sample at `utime`, between its two neighbours in proportion to time; saturated where either
-/// is.
+/// The sample at `utime`, interpolated linearly between its neighbours; saturated if either is.
 LevelSample interpolate(const LevelSample& before, const LevelSample& after, model::Utime utime);
 
-/// Recent levelled samples, asked for the interval between two stamps. Invariant: in order of time.
+/// Recent levelled samples, for intervals between two stamps. Invariant: in order of time.
 class LevelSamples {
  public:
-  /// `max_gap_s`: samples farther apart are not joined.
+  /// `max_gap_s`: samples at a larger distance in time are not joined.
   explicit LevelSamples(double max_gap_s) : max_gap_s_(max_gap_s) {}
 
   /// Precondition: not before the latest one.
   void add(const LevelSample& sample) { samples_.push_back(sample); }
-  /// Keeps what is needed from `utime` on.
+  /// Removes samples that are not needed from `utime` on.
   void forget_before(model::Utime utime);
-  /// Samples at `from`, all in between, and at `to`; none where a gap or an end is in between.
+  /// Samples at `from`, all in between, and at `to`; none if there is a gap or the samples end.
   std::optional<std::deque<LevelSample>> between(model::Utime from, model::Utime to) const;
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.samples_);
@@ -61,12 +60,12 @@ class LevelSamples {
 };
 
 /// Integrates samples (the first at the start, the last at the end of the interval) with the
-/// trapezoidal rule. `bias`: taken out, and what the Jacobian is about. Noise: that of the samples,
-/// of the level and of the lever.
+/// trapezoidal rule. `bias`: subtracted, and the point of the Jacobian. Noise: of the samples, of
+/// the level and of the lever.
 model::Preintegration preintegrate(const std::deque<LevelSample>& samples, const ImuParameters& imu,
                                    const model::InertialBias& bias);
 
-/// Bias of the gyro's yaw rate, and how well it is known.
+/// Bias of the gyro's yaw rate, and its uncertainty.
 struct YawRateBias {
   double bias_rad_s = 0.0;
   double sigma_rad_s = 0.0;
@@ -79,7 +78,7 @@ struct YawRateBias {
 };
 
 /// Motion of frame `vehicle` from the wheels' speed and the gyro's yaw rate over the samples (first
-/// and last at the interval's ends). None where the speeds do not cover the interval.
+/// and last at the interval's ends). None if the speeds do not cover the interval.
 std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
                                                  const WheelSpeeds& speeds,
                                                  const LidarImuInputParameters& parameters,

@@ -7,7 +7,7 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-/// When motion is noticed, it began at most this long ago.
+/// Largest delay of the detection of motion.
 constexpr double kBetweenRests_s = 0.2;
 
 }  // namespace
@@ -70,7 +70,7 @@ LevelSample Levelling::level(const model::ImuSample& sample, bool is_saturated) 
 
   LevelSample result;
   result.utime = sample.utime;
-  // Rate of the heading; the bias about z stays in, for `InertialBias`.
+  // Rate of the heading; the bias about z is not subtracted: see `InertialBias`.
   result.yaw_rate_rad_s =
       (std::sin(angles.roll_rad) * (rate.y() - bias.y()) + std::cos(angles.roll_rad) * rate.z()) /
       std::cos(angles.pitch_rad);

@@ -1,4 +1,4 @@
-// The IMU's latest sample, and the attitude that levels it.
+// The IMU's latest sample, and the attitude for its levelling.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace understory::lidar_imu_input {
 
-/// Owns the attitude filter and the sample up to which it has been propagated. Invariant: once
-/// begun there are an attitude, a latest sample, and that sample levelled.
+/// Owns the attitude filter and the sample up to which it has been propagated. Invariant: after
+/// begin() there are an attitude, a latest sample, and that sample levelled.
 class Levelling {
  public:
   /// `imu`: noise and priors of the attitude filter.
@@ -22,37 +22,38 @@ class Levelling {
   /// The first sample (frame vehicle): tilt from its force.
   void begin(const model::ImuSample& sample);
   /// Propagates the attitude from the latest sample to this one, `seconds` later. `is_saturated`:
-  /// samples between the two were left out. Precondition: has begun.
+  /// samples between the two were omitted. Precondition: begin() was called.
   void propagate(const model::ImuSample& sample, bool is_saturated, double seconds);
-  /// `seconds` pass that no sample covers: the attitude becomes less certain.
+  /// Propagates over `seconds` without samples: the uncertainty of the attitude grows.
   void bridge(double seconds);
-  /// The vehicle is at rest at this sample, up to which the attitude was propagated, and the
-  /// attitude was told so.
+  /// Stores a rest: the vehicle is stationary at this sample, and the attitude, propagated to it,
+  /// was updated by that.
   void keep_rest(const model::ImuSample& sample);
-  /// The vehicle has moved for some tenths of a second, but the attitude was told that it is at
-  /// rest. The attitude becomes that of 0.2 to 0.4 s ago, propagated by the samples since, and is
-  /// marked (mark_level()). Gives the time to which it went back; does nothing if no rest was kept.
+  /// Corrects a late detection of motion: for some tenths of a second the vehicle moved, but the
+  /// attitude was updated with zero velocity. The attitude is reset to that of 0.2 to 0.4 s ago,
+  /// propagated by the samples since, and marked (mark_level()). Returns the time of the reset;
+  /// does nothing if no rest was stored.
   std::optional<model::Utime> start_moving();
-  /// The sample in `vehicle_level`, by the attitude as it is now. Precondition: has begun.
+  /// The sample in `vehicle_level`, by the present attitude. Precondition: begin() was called.
   LevelSample level(const model::ImuSample& sample, bool is_saturated) const;
-  /// The sample becomes the latest one.
+  /// Sets the latest sample.
   void set_latest(const model::ImuSample& sample, const LevelSample& level);
 
   /// None before the first sample.
   const std::optional<AttitudeFilter>& attitude() const { return attitude_; }
-  std::optional<AttitudeFilter>& attitude() { return attitude_; }  ///< To be updated.
-  /// Latest sample, frame vehicle; none before the first one.
+  std::optional<AttitudeFilter>& attitude() { return attitude_; }  ///< For updates.
+  /// Latest sample, frame vehicle; none before the first.
   const std::optional<model::ImuSample>& latest() const { return latest_; }
   /// The same sample levelled.
   const std::optional<LevelSample>& latest_level() const { return latest_level_; }
-  /// Whether a loaded state keeps the invariant.
+  /// Whether a loaded state satisfies the invariant.
   bool is_whole() const {
     const bool has_begun = attitude_.has_value();
     return has_begun == latest_.has_value() && has_begun == latest_level_.has_value() &&
            rests_.empty() == since_rest_.empty();
   }
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     bool has_attitude = self.attitude_.has_value();
@@ -82,7 +83,7 @@ class Levelling {
 
   ImuParameters imu_;
   std::optional<AttitudeFilter> attitude_;
-  /// A sample, and whether samples before it were left out.
+  /// A sample, and whether samples before it were omitted.
   struct Step {
     model::ImuSample sample;
     bool is_saturated = false;
@@ -92,7 +93,7 @@ class Levelling {
       a(self.sample, self.is_saturated);
     }
   };
-  std::deque<Rest> rests_;       ///< The latest ones, in order of time.
+  std::deque<Rest> rests_;       ///< The latest, in order of time.
   std::deque<Step> since_rest_;  ///< From the older rest's sample on; empty without rests.
   std::optional<model::ImuSample> latest_;
   std::optional<LevelSample> latest_level_;

@@ -15,7 +15,7 @@ model::ImuSample LeverCompensation::to_vehicle(const model::ImuSample& sensor_sa
   const Eigen::Vector3d& rate = sample.angular_rate_rad_s;
   Eigen::Vector3d lever_force = rate.cross(rate.cross(lever));
 
-  // Keep the samples of the baseline; after a gap start anew.
+  // Keeps the samples of the baseline; starts anew after a gap.
   if (!raw_.empty() && seconds_between(raw_.back().utime, sample.utime) > imu_.max_gap_s)
     raw_.clear();
   raw_.push_back(sample);
@@ -23,7 +23,7 @@ model::ImuSample LeverCompensation::to_vehicle(const model::ImuSample& sensor_sa
     raw_.pop_front();
 
   // Tangential force. Differences of the rate telescope in the integral, so their noise does not
-  // add up; over several samples there is less of it.
+  // accumulate; over several samples it is smaller.
   const double seconds = seconds_between(raw_.front().utime, sample.utime);
   if (seconds > 0.0) lever_force += (rate - raw_.front().angular_rate_rad_s).cross(lever) / seconds;
 

@@ -1,4 +1,4 @@
-// The IMU's samples as if it sat at the vehicle's origin and were aligned with it.
+// Transforms the IMU's samples to the vehicle's origin and axes.
 #pragma once
 
 #include <deque>
@@ -8,8 +8,8 @@
 
 namespace understory::lidar_imu_input {
 
-/// Turns samples into frame `vehicle` and takes out the force that the IMU feels because the
-/// vehicle rotates about its origin: w x (w x l) + dw/dt x l, with lever l. Invariant: the kept
+/// Rotates samples into frame `vehicle` and subtracts the force that the IMU measures because the
+/// vehicle rotates about its origin: w x (w x l) + dw/dt x l, with lever l. Invariant: the stored
 /// samples span at most about `kLeverBaseline_s`.
 class LeverCompensation {
  public:
@@ -19,13 +19,12 @@ class LeverCompensation {
   /// The sample in frame vehicle, as if measured at its origin. Precondition: stamps advance.
   model::ImuSample to_vehicle(const model::ImuSample& sensor_sample);
 
-  /// Latest sample in frame vehicle, lever force not taken out. Precondition: to_vehicle() was
-  /// called.
+  /// Latest sample in frame vehicle, with the lever force. Precondition: to_vehicle() was called.
   const model::ImuSample& latest_raw() const { return raw_.back(); }
-  /// Whether no sample has come yet.
+  /// Whether no sample has arrived yet.
   bool empty() const { return raw_.empty(); }
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.raw_);
@@ -33,7 +32,7 @@ class LeverCompensation {
 
  private:
   ImuParameters imu_;
-  std::deque<model::ImuSample> raw_;  ///< Latest, frame vehicle, lever force not taken out.
+  std::deque<model::ImuSample> raw_;  ///< Latest, frame vehicle, with the lever force.
 };
 
 }  // namespace understory::lidar_imu_input

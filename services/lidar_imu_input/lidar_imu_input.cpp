@@ -25,7 +25,7 @@ bool is_finite(const model::VelocityCorrection& c) {
   return c.velocity_mps.allFinite() && c.bias.allFinite() && c.covariance.allFinite();
 }
 
-/// A laser's points are looked at one by one.
+/// A laser's points are checked individually.
 bool is_finite(const model::PointSweep& /*sweep*/) { return true; }
 bool is_finite(const model::PlanarScan& /*scan*/) { return true; }
 
@@ -33,13 +33,13 @@ InputFault not_finite(const std::string& channel) {
   return {InputFaultKind::kNotFinite, channel, "a value that is no number"};
 }
 
-/// Moves the faults behind the results.
+/// Appends the faults to the results.
 void report(std::vector<InputFault>& faults, InputResults& out) {
   for (InputFault& fault : faults) out.emplace_back(std::move(fault));
   faults.clear();
 }
 
-/// Takes out points that are no points; gives how many they were.
+/// Removes invalid points; returns their number.
 std::size_t clean(model::PointSweep& sweep, const DeskewParameters& parameters,
                   std::vector<InputFault>& faults) {
   const std::size_t came = sweep.points.size();
@@ -64,7 +64,7 @@ InputFault after_step_back(Sensor sensor, double back_s) {
                       back_s)};
 }
 
-/// A sweep without times is not de-skewed, unless its azimuths give them.
+/// A sweep without times is not de-skewed, unless its azimuths give the times.
 InputFault without_times(model::PointSweep& sweep, const DeskewParameters& parameters) {
   const std::string& direction = parameters.times_from_azimuth;
   if (direction == "none")
@@ -75,7 +75,7 @@ InputFault without_times(model::PointSweep& sweep, const DeskewParameters& param
           "points without times: taken from the azimuth"};
 }
 
-/// Beams that come over longer than a revolution can last have no times.
+/// Removes beam times that exceed the duration of a revolution.
 std::optional<InputFault> without_impossible_times(model::PlanarScan& scan) {
   if (scan.beam_interval_s == 0.0 || scan.ranges_m.size() < 2 || has_beam_times(scan))
     return std::nullopt;
@@ -104,7 +104,7 @@ InputResults LidarImuInput::add(RawReading raw) {
   InputResults out;
   std::vector<InputFault> faults;
 
-  // What is wrong with a sweep's points?
+  // Are the sweep's points valid?
   if (auto* sweep = std::get_if<model::PointSweep>(&raw)) {
     counters_.points_dropped += clean(*sweep, parameters_.lidar, faults);
     guard_.is_frozen(*sweep, faults);
@@ -114,7 +114,7 @@ InputResults LidarImuInput::add(RawReading raw) {
     if (auto fault = without_impossible_times(*scan)) faults.push_back(*std::move(fault));
   }
 
-  // Is its stamp to be believed?
+  // Is its stamp to be trusted?
   report(faults, out);
   AfterStepBack after = step_back_.take(std::move(raw), guard_);
   if (after.back_s) {
@@ -125,7 +125,7 @@ InputResults LidarImuInput::add(RawReading raw) {
   return out;
 }
 
-/// A reading on the time that never goes back.
+/// Uses a reading in the time that never goes back.
 void LidarImuInput::take(RawReading reading, InputResults& out) {
   const Sensor sensor = sensor_of(reading);
   std::vector<InputFault> faults;
@@ -134,14 +134,14 @@ void LidarImuInput::take(RawReading reading, InputResults& out) {
   if (believed.pause_s) out.emplace_back(after_pause(sensor, *believed.pause_s));
   if (believed.pause_s > kLongestPause_s) begin_anew();
 
-  // Use what nothing before it is missing of.
+  // Uses readings without missing predecessors.
   for (RawReading& one : believed.readings) {
     if (auto fault = order_.add(std::move(one), guard_)) out.emplace_back(*std::move(fault));
     use_ready(out, false);
   }
 }
 
-/// The vehicle may be anywhere, and its sensors at any temperature.
+/// The vehicle's pose and its sensors' temperature are unknown.
 void LidarImuInput::begin_anew() {
   const StepBack step_back = step_back_;
   const GravityCheck gravity = gravity_;
@@ -159,7 +159,7 @@ bool LidarImuInput::leaves_out(Sensor sensor) const {
   return sensor == Sensor::kWheels && is_by_motion && !is_of_imu;
 }
 
-/// What was made of the samples so far is wrong.
+/// Results from earlier samples are wrong.
 void LidarImuInput::begin_motion_anew() {
   motion_ = MotionEstimator(parameters_);
   if (increment_end_) motion_.begin(*increment_end_);
@@ -175,11 +175,11 @@ void LidarImuInput::note_left_out() {
 }
 
 void LidarImuInput::use(const model::ImuSample& raw, InputResults& out) {
-  // What is wrong with it?
+  // Is it valid?
   std::vector<InputFault> faults;
   const bool frozen = guard_.is_frozen(raw, faults);
   if (!frozen && gravity_.add(raw)) {
-    // All motion so far was of a wrong unit: it begins anew.
+    // All motion so far was in a wrong unit: it begins anew.
     begin_motion_anew();
     out.emplace_back(InputFault{InputFaultKind::kUnit, channel_of(Sensor::kImu),
                                 "the acceleration is in g and taken times 9.81: its driver must "
@@ -195,8 +195,8 @@ void LidarImuInput::use(const model::ImuSample& raw, InputResults& out) {
   if (!utime || left_out_imu_) return;
 
   if (saturated) {
-    // It is a bound, no measurement. Over a bump the samples beside it are joined, with more noise;
-    // where it lasts longer the wheels go on alone, as without an IMU.
+    // A saturated sample is a bound, not a measurement. Over a bump its neighbours are joined, with
+    // more noise; if it lasts longer the wheels are used alone, as without an IMU.
     ++counters_.samples_saturated;
     was_saturated_ = true;
     return;
@@ -278,7 +278,7 @@ InputResults LidarImuInput::finish() {
   return out;
 }
 
-/// Readings that nothing before them is missing of (or `everything`).
+/// Uses readings without missing predecessors (or `everything`).
 void LidarImuInput::use_ready(InputResults& out, bool everything) {
   while (auto next = order_.next(guard_, everything)) {
     std::visit([&](auto&& value) { use(std::forward<decltype(value)>(value), out); },
@@ -296,7 +296,8 @@ void LidarImuInput::wait(WaitingSweep waiting, InputResults& out) {
   out.emplace_back(*std::move(admission.fault));
 }
 
-/// Ends increments of odometry and releases sweeps, as far as motion is known (or `everything`).
+/// Ends increments of odometry and releases sweeps, as far as the motion is known (or
+/// `everything`).
 void LidarImuInput::settle(InputResults& out, bool everything) {
   std::vector<InputFault> faults;
   guard_.find_silent(faults);
@@ -312,8 +313,8 @@ void LidarImuInput::settle(InputResults& out, bool everything) {
     const bool has_item = !queue_.empty();
     const bool moves = guard_.has_spoken(Sensor::kImu) || guard_.has_spoken(Sensor::kWheels);
 
-    // An increment ends without a sweep where none can come any more for its time, or the next is
-    // far: then increments of the usual length lead up to it.
+    // An increment ends without a sweep if none can arrive for its time any more, or the next is
+    // far ahead: then increments of the usual length lead up to it.
     const bool near =
         has_item && increment_end_ && 2 * (queue_.front().end - *increment_end_) <= 3 * longest;
     const bool regular = now && moves && increment_end_ && !near &&
@@ -364,7 +365,7 @@ void LidarImuInput::release(WaitingSweep waiting, InputResults& out) {
   }
 }
 
-/// Beams that come one after another are de-skewed as those of a laser that scans in space.
+/// Beams with different times are de-skewed like those of a 3-D laser.
 void LidarImuInput::release_scan(model::PlanarScan scan, model::Utime stamp, InputResults& out) {
   if (has_beam_times(scan)) {
     release_sweep(sweep_of(scan), Sensor::kScan, stamp, out);
@@ -377,7 +378,7 @@ void LidarImuInput::release_scan(model::PlanarScan scan, model::Utime stamp, Inp
 
 void LidarImuInput::release_sweep(model::PointSweep raw, Sensor sensor, model::Utime stamp,
                                   InputResults& out) {
-  // Where no sensor measures the motion, the filter's is taken.
+  // Without a motion sensor the filter's motion is used.
   MotionHistory by_filter;
   if (!motion_.history().at(stamp)) {
     if (const auto motion = filter_motion_.at(stamp)) by_filter.add(*motion);
@@ -389,7 +390,7 @@ void LidarImuInput::release_sweep(model::PointSweep raw, Sensor sensor, model::U
   const SensorMount& mount =
       sensor == Sensor::kScan ? parameters_.planar.mount : parameters_.lidar.mount;
   DeskewedSweep result = deskew(std::move(raw), stamp, history, mount);
-  // Without an IMU the attitude is not known, and the filter's motion has none.
+  // Without an IMU the attitude is unknown, and the filter's motion contains none.
   if (!motion_.attitude() || !by_filter.empty()) result.sweep.attitude.reset();
 
   if (sensor == Sensor::kSweep) laser_.add(result.sweep);

@@ -1,10 +1,10 @@
 // The input stage: raw sensors in, one consistent stream of motion and sweeps out.
 //
 // An increment of ODOMETRY ends exactly at the stamp of each published sweep or scan and is
-// published before it; in between, increments end at most `max_increment_s` apart. So a sweep waits
-// until the IMU and the wheels have reached its end, but no longer than `max_wait_s` of the
-// sensors' own time. Before any of this readings are put in the order of their stamps, and those
-// are held back whose stamps nothing supports (`ArrivalOrder`, `TimeBase`).
+// published before it; in between, increments are at most `max_increment_s` long. So a sweep waits
+// until the IMU and the wheels have reached its end, but at most `max_wait_s` of the sensors' own
+// time. Before that, readings are sorted by their stamps, and readings with doubtful stamps are
+// held back (`ArrivalOrder`, `TimeBase`).
 #pragma once
 
 #include <optional>
@@ -41,17 +41,17 @@ using InputResult = std::variant<model::ImuSample, model::WheelSample, model::Gn
 /// In the order of publishing.
 using InputResults = std::vector<InputResult>;
 
-/// What became of sweeps, increments and samples, since the start.
+/// Counts of sweeps, increments and samples, since the start.
 struct InputCounters {
   std::uint64_t sweeps = 0;               ///< Published.
   std::uint64_t sweeps_not_deskewed = 0;  ///< Published without any motion.
   std::uint64_t sweeps_by_filter = 0;     ///< De-skewed by the filter's motion.
   std::uint64_t sweeps_carried = 0;       ///< Late: stamped with the end of the latest increment.
-  std::uint64_t sweeps_dropped = 0;       ///< Too late even for that, or waiting at a restart.
+  std::uint64_t sweeps_dropped = 0;       ///< Later than that permits, or waiting at a restart.
   std::uint64_t points_dropped = 0;       ///< Not finite.
   std::uint64_t increments_missing = 0;   ///< Intervals without any motion sensor.
-  std::uint64_t corrections_late = 0;     ///< Took effect later than their delay.
-  std::uint64_t samples_saturated = 0;    ///< Of the IMU: left out.
+  std::uint64_t corrections_late = 0;     ///< Applied after their delay.
+  std::uint64_t samples_saturated = 0;    ///< Of the IMU: omitted.
 
   /// For saving and loading.
   template <class Archive, class Self>
@@ -62,46 +62,45 @@ struct InputCounters {
   }
 };
 
-/// The stage. Each add() gives what can be published now; no message is refused by an exception,
-/// faults are results. Invariant: stamps of each output advance, and increments of odometry join
-/// without gaps but where no sensor measured motion.
+/// The stage. Each add() returns the results that can be published now; faults are results, never
+/// exceptions. Invariant: stamps of each output advance, and increments of odometry follow each
+/// other without gaps unless no sensor measured the motion.
 class LidarImuInput {
  public:
-  /// Starts without any motion known. Precondition: parameters within the ranges of describe().
+  /// Starts with unknown motion. Precondition: parameters within the ranges of describe().
   explicit LidarImuInput(const LidarImuInputParameters& parameters = {});
 
-  /// A reading of a sensor, frame sensor; of a laser that scans in space a whole revolution.
+  /// A reading of a sensor, frame sensor; a whole revolution of a 3-D laser.
   InputResults add(RawReading raw);
   InputResults add(const model::VelocityCorrection& correction);  ///< VELOCITY_CORRECTION.
-  /// EKF_POSE: where no sensor measures the motion, sweeps are de-skewed by the filter's.
+  /// EKF_POSE: without a motion sensor, sweeps are de-skewed by the filter's motion.
   InputResults add(const model::EkfPose& pose);
-  /// The drive is over: what still waits goes out.
+  /// End of the drive: publishes everything that waits.
   InputResults finish();
 
-  /// The state as bytes: everything but the points of sweeps that wait.
+  /// The state as bytes: everything except the points of waiting sweeps.
   std::string save() const;
-  /// Goes on from a saved state. Throws std::invalid_argument for what save() did not give, and
-  /// stays as it was.
+  /// Continues from a saved state. Throws std::invalid_argument on other bytes, without change.
   void load(const std::string& state);
-  /// After a longer pause of all sensors, or of the service, the vehicle may be anywhere, and its
-  /// sensors at any temperature: the stage starts anew.
+  /// After a longer pause of all sensors, or of the service, the vehicle's pose and its sensors'
+  /// temperature are unknown: the stage restarts.
   static constexpr double kLongestPause_s = 600.0;
 
-  /// Whether the sensor is left out of the motion, as what it measures is certainly wrong.
+  /// Whether the sensor is not used for the motion, because its measurements are certainly wrong.
   bool leaves_out(Sensor sensor) const;
-  /// What the IMU shows of gravity.
+  /// The check of the IMU by gravity.
   const GravityCheck& gravity() const { return gravity_; }
-  /// Whether IMU and wheels measure one motion.
+  /// The check of IMU against wheels.
   const MotionAgreement& agreement() const { return agreement_; }
-  /// Whether the laser sees the ground where it must.
+  /// The check of the laser by the ground.
   const LaserCheck& laser() const { return laser_; }
-  /// Whether a sensor that must send does not.
+  /// Whether a sensor that must send is silent.
   bool is_silent(Sensor sensor) const { return guard_.is_silent(sensor); }
   const InputCounters& counters() const { return counters_; }  ///< Since the first start.
   /// Attitude, dead reckoning, calibration.
   const MotionEstimator& motion() const { return motion_; }
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.step_back_, self.time_base_, self.order_, self.guard_, self.gravity_, self.agreement_,
@@ -143,7 +142,7 @@ class LidarImuInput {
   std::optional<model::Utime> increment_end_;  ///< Of the latest odometry.
   RawPosePacer raw_poses_;
   CalibrationWatch calibration_;
-  bool was_saturated_ = false;  ///< The latest sample of the IMU; it was left out.
+  bool was_saturated_ = false;  ///< The IMU's latest sample was saturated and omitted.
   bool left_out_imu_ = false;   ///< See leaves_out().
   bool left_out_wheels_ = false;
 };

@@ -1,4 +1,4 @@
-// The input stage as a process. Its channels: LidarImuInputChannels in adapter.hpp, and --help.
+// The input stage's process. Its channels: LidarImuInputChannels in adapter.hpp, and --help.
 #include "services/lidar_imu_input/adapter.hpp"
 
 int main(int argc, char** argv) {

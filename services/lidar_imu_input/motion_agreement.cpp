@@ -12,25 +12,25 @@ namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kAgreementDegree_rad = std::numbers::pi / 180.0;
-/// What rates are multiplied with: by each gyro that is tried.
+/// Factors of the rates, for each tested gyro.
 constexpr double kGyroFactors[] = {1.0, -1.0, kAgreementDegree_rad};
 
 constexpr double kWindow_s = 0.5;
 constexpr double kEnd_s = 0.1;
-/// The gyro keeps gravity for so long.
+/// Time for which the gyro keeps the direction of gravity.
 constexpr double kKeepsLevel_s = 30.0;
-/// A window with less speed says nothing.
+/// Least speed of a window.
 constexpr double kMoves_mps = 0.3;
 
 /// Errors of a window's means: bumps and the level; noise and zero of the steering; its scale.
 constexpr double kForceSigma_mps2 = 0.1;
 constexpr double kTurnSigma_rad_s = 0.02;
 constexpr double kTurnSigma_share = 0.1;
-/// chi^2 of one number that counts at most: slip and bumps must not decide.
+/// Largest chi^2 of one number: slip and bumps must not decide.
 constexpr double kMostChi2 = 16.0;
-/// By so much chi^2 an account must explain all better than that nothing is wrong,
+/// Least decrease of chi^2 by a fault relative to no fault,
 constexpr double kIsWrong = 40.0;
-/// and than each account that blames the other sensor.
+/// and relative to each fault of the other sensor.
 constexpr double kIsTheOne = 12.0;
 
 constexpr double kYawStep_rad = 2.0 * kAgreementDegree_rad;
@@ -44,7 +44,7 @@ std::size_t gyro_of(OddOne odd) {
   return odd == OddOne::kGyroSign ? 1 : odd == OddOne::kGyroUnit ? 2 : 0;
 }
 
-/// All that is tried, with the steering and without.
+/// All hypotheses, with the steering and without.
 std::vector<MotionAccount> all_accounts() {
   std::vector<MotionAccount> accounts;
   const auto add = [&](OddOne odd, double value) {
@@ -84,7 +84,8 @@ MotionAgreement::MotionAgreement(const LidarImuInputParameters& parameters)
 }
 
 void MotionAgreement::add(const model::WheelSample& raw) {
-  if (seconds_between(raw.utime, window_.from) > kEnd_s) return;  // Late: of another window.
+  if (seconds_between(raw.utime, window_.from) > kEnd_s)
+    return;  // Late: belongs to another window.
   const double speed = axle_speed(car_, raw.speed_mps, raw.steering_rad);
   latest_wheels_utime_ = raw.utime;
   window_.speed += speed;
@@ -100,7 +101,7 @@ void MotionAgreement::add(const model::ImuSample& raw) {
   const double seconds = latest_imu_ ? seconds_between(latest_imu_->utime, raw.utime) : 0.0;
   latest_imu_ = raw;
   if (seconds <= 0.0 || seconds > kEnd_s) {
-    // Nothing is known of the motion in between.
+    // The motion in between is unknown.
     rested_utime_.reset();
     rest_windows_ = 0.0;
     speed_before_.reset();
@@ -177,7 +178,7 @@ double MotionAgreement::misfit(const MotionAccount& account, const Measured& mea
   const double steered = side * by_wheels * measured.steered_rad_s;
   const double turn = account.steered ? steered : measured.turn_rad_s[gyro];
 
-  // The IMU beside the vehicle's origin feels its own curve.
+  // An IMU away from the vehicle's origin measures its own centripetal force.
   const double turning = measured.turning_rad_s2[gyro];
   Eigen::Vector2d force(by_wheels * measured.acceleration_mps2, speed * turn);
   force += turning * Eigen::Vector2d(-mount_.y_m, mount_.x_m) -
@@ -218,7 +219,7 @@ void MotionAgreement::judge() {
   const std::size_t other = is_imu ? with.wheels : with.imu;
   if (chi2_[one] + kIsWrong > chi2_[with.none] || chi2_[one] + kIsTheOne > chi2_[other]) return;
 
-  // A vehicle may measure no steering: what is wrong must be so without it, too.
+  // A vehicle may measure no steering: the fault must be significant without it, too.
   if (accounts_[one].odd != OddOne::kSteering) {
     const Best without = best(false);
     const std::size_t same = is_imu ? without.imu : without.wheels;

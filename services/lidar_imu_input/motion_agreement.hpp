@@ -1,4 +1,5 @@
-// Whether gyro, accelerometer, wheel speed and steering measure one motion, and which does not.
+// Checks whether gyro, accelerometer, wheel speed and steering measure one motion, and finds the
+// faulty one.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,56 +15,55 @@
 
 namespace understory::lidar_imu_input {
 
-/// What may be wrong with IMU or wheels, one thing at a time.
+/// Possible fault of IMU or wheels, one at a time.
 enum class OddOne : std::uint8_t {
   kNone,        ///< All agree.
   kImuYaw,      ///< The IMU is mounted at another yaw.
-  kGyroSign,    ///< Rates are turned round.
+  kGyroSign,    ///< Rates have the wrong sign.
   kGyroUnit,    ///< Rates are in degrees per second.
-  kWheelSpeed,  ///< The speed is too large, too small, or turned round.
+  kWheelSpeed,  ///< The speed is too large, too small, or has the wrong sign.
   kSteering,    ///< Left and right are swapped.
 };
 
-/// One account of the motion: a thing that is wrong, and by how much.
+/// One hypothesis: a fault and its size.
 struct MotionAccount {
   OddOne odd = OddOne::kNone;
   double value = 0.0;   ///< Yaw to be added [rad], or factor of the speed.
-  bool steered = true;  ///< False: the steering angle says nothing, the gyro gives all turns.
+  bool steered = true;  ///< False: the steering angle is ignored, all rotations are from the gyro.
 };
 
-/// Over half a second each: the accelerometer without gravity against the change of the wheels'
-/// speed and the force towards the inside of a curve, and the gyro's turn against that by steering.
-/// With three sources the one that disagrees with the others is the culprit: each account of the
-/// motion in which one thing is wrong is tried, and believed where it explains all windows far
-/// better than that nothing is wrong, and than that another sensor is. Gravity is that of the last
-/// standstill, turned by the gyro; so nothing is said before the first standstill, nor later
-/// than half a minute after one. Independent of everything that is estimated elsewhere. Cost: three
-/// rotations per sample, about 560 accounts per half second.
+/// Over half a second each, compares the accelerometer without gravity with the change of the
+/// wheels' speed and with the centripetal force, and the gyro's rotation with that by steering.
+/// With three sources the one that disagrees is faulty: each hypothesis with one fault is tested,
+/// and accepted if it fits all windows far better than no fault does, and than a fault of another
+/// sensor. Gravity is that of the last standstill, rotated by the gyro; so there is no result
+/// before the first standstill, nor later than half a minute after one. Independent of all other
+/// estimates. Cost: three rotations per sample, about 560 hypotheses per half second.
 class MotionAgreement {
  public:
-  /// Mounting of the IMU and geometry of the car.
+  /// `parameters`: mounting of the IMU and geometry of the car.
   explicit MotionAgreement(const LidarImuInputParameters& parameters);
 
   /// A sample in frame sensor, its force in m/s^2; stamps advance.
   void add(const model::ImuSample& raw);
-  /// A sample of the wheels as it came.
+  /// A raw sample of the wheels.
   void add(const model::WheelSample& raw);
 
-  /// What is wrong, by all windows so far.
+  /// The fault, by all windows so far.
   OddOne odd() const { return verdict_.odd; }
-  /// By how much: see MotionAccount.
+  /// Its size: see MotionAccount.
   double value() const { return verdict_.value; }
-  /// True for what is wrong with the IMU, false for the wheels.
+  /// True for faults of the IMU, false for the wheels.
   static bool is_of_imu(OddOne odd) {
     return odd == OddOne::kImuYaw || odd == OddOne::kGyroSign || odd == OddOne::kGyroUnit;
   }
-  /// Whether motion is estimated better without the sensor that is wrong. A yaw of the IMU of some
-  /// degrees and the steering beside a gyro do little harm.
+  /// Whether the motion is estimated better without the faulty sensor. A yaw error of the IMU of
+  /// some degrees, or the steering beside a gyro, does little harm.
   bool is_useless() const;
-  /// For a person, with the setting that mends it; empty where nothing is wrong.
+  /// For a person, with the setting that corrects it; empty without a fault.
   std::string text() const;
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.chi2_, self.verdict_.odd, self.verdict_.value, self.rest_force_, self.rest_rate_,
@@ -72,7 +72,7 @@ class MotionAgreement {
   }
 
  private:
-  static constexpr std::size_t kGyros = 3;  ///< As it is, turned round, in degrees.
+  static constexpr std::size_t kGyros = 3;  ///< Unchanged, sign reversed, in degrees.
 
   /// Sums over half a second.
   struct Window {
@@ -87,7 +87,7 @@ class MotionAgreement {
     double steered = 0.0;
     double fastest = 0.0;
     double samples = 0.0;
-    double last_speed = 0.0;  ///< Of the last tenth of a second.
+    double last_speed = 0.0;  ///< Of the last 0.1 s.
     double last_samples = 0.0;
 
     template <class Archive, class Self>
@@ -96,7 +96,7 @@ class MotionAgreement {
         self.steered, self.fastest, self.samples, self.last_speed, self.last_samples);
     }
   };
-  /// What a window measured.
+  /// Measurements of a window.
   struct Measured {
     std::array<Eigen::Vector2d, kGyros> force_mps2;  ///< Without gravity, frame vehicle.
     std::array<double, kGyros> turn_rad_s{};
@@ -111,7 +111,7 @@ class MotionAgreement {
   void compare(const Measured& measured);
   double misfit(const MotionAccount& account, const Measured& measured) const;
   void judge();
-  /// The best account of each sensor, and that nothing is wrong: places in accounts_.
+  /// The best hypothesis of each sensor, and that of no fault: indices in accounts_.
   struct Best {
     std::size_t none = 0;
     std::size_t imu = 0;
@@ -123,17 +123,17 @@ class MotionAgreement {
   SensorMount mount_;
   CarGeometry car_;
   double rest_speed_mps_;
-  std::vector<MotionAccount> accounts_;  ///< Their chi2 is in chi2_.
+  std::vector<MotionAccount> accounts_;  ///< chi2_ has their chi^2.
   std::vector<double> chi2_;
   MotionAccount verdict_;
 
   Eigen::Vector3d rest_force_ = Eigen::Vector3d::Zero();  ///< At the last standstill.
   Eigen::Vector3d rest_rate_ = Eigen::Vector3d::Zero();
-  double rest_windows_ = 0.0;  ///< Of this standstill; 0 = moving.
+  double rest_windows_ = 0.0;  ///< Number in the present standstill; 0 = moving.
   std::optional<model::Utime> rested_utime_;
-  std::array<Eigen::Quaterniond, kGyros> turned_;  ///< Since then, by each gyro.
+  std::array<Eigen::Quaterniond, kGyros> turned_;  ///< Rotation since then, by each gyro.
   Window window_;
-  std::optional<double> speed_before_;  ///< At the end of the window before.
+  std::optional<double> speed_before_;  ///< At the end of the previous window.
   std::array<double, kGyros> turn_before_{};
   std::optional<model::ImuSample> latest_imu_;
   model::Utime latest_wheels_utime_ = 0;

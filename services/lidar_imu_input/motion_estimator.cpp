@@ -6,7 +6,7 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-/// Samples of an IMU that come later than this are not waited for.
+/// IMU samples with a larger delay are not waited for.
 constexpr double kLatestImu_s = 12.0;
 
 }  // namespace
@@ -59,7 +59,7 @@ void MotionEstimator::propagate(const model::ImuSample& sample, bool is_saturate
   levelling_.propagate(sample, is_saturated, seconds);
   AttitudeFilter& attitude = *levelling_.attitude();
 
-  // Standstill: velocity zero, and the gyro shows its bias.
+  // Standstill: velocity zero, and the gyro measures its bias.
   const bool was_stationary = stationary_.moved_utime() < levelling_.latest()->utime;
   stationary_.add(lever_.latest_raw(), seconds, attitude.gyro_bias(),
                   VelocityEvidence::of(pose_.reckoning(), speeds_.are_fresh(sample.utime),
@@ -76,13 +76,13 @@ void MotionEstimator::propagate(const model::ImuSample& sample, bool is_saturate
   increments_.add(levelled);
   levelling_.set_latest(sample, levelled);
 
-  // What a moving vehicle cannot do.
+  // Constraints of a moving vehicle.
   if (!is_stationary())
     constraints_.apply(sample, levelled.yaw_rate_rad_s, speeds_.are_fresh(sample.utime), attitude,
                        pose_.reckoning());
 }
 
-/// The standstill ended some tenths of a second ago; since then zero velocity was measured although
+/// The standstill ended some tenths of a second ago; since then zero velocity was applied although
 /// the vehicle moved.
 void MotionEstimator::go_back_to_rest() {
   const auto rest_utime = levelling_.start_moving();
@@ -114,7 +114,7 @@ void MotionEstimator::use_standstill(const model::ImuSample& sample, double seco
   levelling_.keep_rest(sample);
   rest_.add_stationary(stationary_.moved_utime(), sample.utime);
 
-  // The bias of the heading's rate: what the filter has learned while stationary, nothing else.
+  // The bias of the heading's rate, only from the filter's estimate while stationary.
   stationary_.learn_bias(attitude);
   const YawRateBias& bias = stationary_.bias();
   pose_.reckoning().set_gyro_bias(bias.bias_rad_s, bias.sigma_rad_s);
@@ -125,7 +125,7 @@ void MotionEstimator::add_wheels(const model::WheelSample& sample) {
   increments_.add(sample);
   stationary_.add_wheel_speed(sample.utime, sample.speed_mps);
 
-  // The scale that IMU and wheels together show is taken out.
+  // Corrects the speed by the scale that IMU and wheels together give.
   const auto then = pose_.history().at(sample.utime);
   const double speed_mps = middle_speed(sample, then ? &*then : nullptr);
   speeds_.add(speeds_.corrected(sample.utime, speed_mps, wheel_scale()));
@@ -137,8 +137,8 @@ void MotionEstimator::add_wheels(const model::WheelSample& sample) {
     while (seconds_between(ahead_.front().utime, sample.utime) > kLatestImu_s) ahead_.pop_front();
     return;
   }
-  // What comes late in one burst has one error of the velocity then: counted once for each sample
-  // it would correct the velocity of now many times over.
+  // Late samples in one burst contain the same error of the velocity of that time: applying it once
+  // for each sample would overcorrect the present velocity.
   if (then && speeds_.are_fresh(latest->utime)) correct_by_wheels(sample, *then);
 }
 
@@ -150,14 +150,14 @@ double MotionEstimator::middle_speed(const model::WheelSample& sample,
   return sample.speed_mps + then->rate_rad_s.z() * car.encoder_left_m;
 }
 
-/// The scale that IMU and wheels together show; none without an IMU.
+/// The scale of the wheels from IMU and wheels together; none without an IMU.
 std::optional<WheelScale> MotionEstimator::wheel_scale() const {
   const std::optional<AttitudeFilter>& attitude = levelling_.attitude();
   if (!attitude) return std::nullopt;
   return WheelScale{attitude->wheel_scale(), attitude->wheel_scale_sigma()};
 }
 
-/// `then`: the motion at the sample, as attitude and dead reckoning have it.
+/// `then`: the motion at the sample, by attitude and dead reckoning.
 void MotionEstimator::correct_by_wheels(const model::WheelSample& sample, const MotionState& then) {
   if (is_stationary()) return;
   const double speed_mps = middle_speed(sample, &then);
@@ -166,7 +166,7 @@ void MotionEstimator::correct_by_wheels(const model::WheelSample& sample, const 
                                *levelling_.attitude(), pose_.reckoning());
 }
 
-/// Uses the wheel samples that waited until the IMU reached their time.
+/// Uses wheel samples that the IMU has reached.
 void MotionEstimator::correct_by_wheels_reached(const model::ImuSample& sample) {
   while (!ahead_.empty() && ahead_.front().utime <= sample.utime) {
     correct_by_wheels(ahead_.front(), pose_.state_at(sample, *levelling_.attitude()));
@@ -199,7 +199,7 @@ bool MotionEstimator::add_correction(const model::VelocityCorrection& correction
 
 void MotionEstimator::use_corrections(model::Utime now) {
   while (const auto correction = corrections_.take_due(now)) {
-    // A reference is corrected by GNSS alone.
+    // A reference is corrected only by GNSS.
     if (parameters_.gnss_aided) continue;
     const auto then = pose_.history().at(correction->utime);
     if (!then) continue;
@@ -216,7 +216,7 @@ std::optional<model::Odometry> MotionEstimator::increment(model::Utime from, mod
   std::optional<AttitudeFilter>& attitude = levelling_.attitude();
   auto odometry = increments_.make(
       from, to, {attitude ? &*attitude : nullptr, speeds_, history(), stationary_});
-  // Where no sample of the IMU has moved the pose, it goes on with the wheels.
+  // If no IMU sample has moved the pose, the wheels move it.
   if (odometry && !odometry->inertial) pose_.follow_wheels(*odometry);
   return odometry;
 }

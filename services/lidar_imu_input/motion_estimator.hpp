@@ -1,5 +1,4 @@
-// Everything that is known about the vehicle's motion without a landmark, and the dead reckoning
-// that the filter may correct.
+// The vehicle's motion without landmarks, and the dead reckoning, which the filter may correct.
 #pragma once
 
 #include <deque>
@@ -22,34 +21,35 @@
 
 namespace understory::lidar_imu_input {
 
-/// Leads each sample of IMU, wheels and GNSS through attitude, standstill, dead reckoning and the
-/// samples of which ODOMETRY is made. Values are finite and stamps per sensor advance: `InputGuard`
-/// sees to that. Cost: some microseconds per sample.
+/// Passes each sample of IMU, wheels and GNSS to attitude, standstill detection, dead reckoning and
+/// the integration of ODOMETRY. Values are finite and stamps per sensor advance: `InputGuard`
+/// ensures that. Cost: some microseconds per sample.
 class MotionEstimator {
  public:
-  /// Starts without any motion known.
+  /// Starts with unknown motion.
   explicit MotionEstimator(const LidarImuInputParameters& parameters);
 
-  /// The sample in frame vehicle, as if measured at its origin; stamps must advance.
+  /// The sample in frame vehicle, transformed to its origin; stamps must advance.
   model::ImuSample to_vehicle(const model::ImuSample& sensor_sample);
-  /// Takes a sample that to_vehicle() gave. `is_saturated`: the samples before it were left out
-  /// since a sensor was at the end of its range.
+  /// Adds a sample from to_vehicle(). `is_saturated`: the samples before it were omitted since a
+  /// sensor was at the end of its range.
   void add_imu(const model::ImuSample& vehicle_sample, bool is_saturated);
-  /// Takes speed and steering. Attitude and velocity are those of the latest IMU sample: a sample
-  /// that is later than that by more than `imu.max_gap_s` corrects them when the IMU gets there.
+  /// Adds speed and steering. Attitude and velocity are those of the latest IMU sample: a sample
+  /// more than `imu.max_gap_s` later corrects them when the IMU has reached its time.
   void add_wheels(const model::WheelSample& sample);
-  /// Takes a fix: ignored unless `gnss_aided`.
+  /// Adds a fix: ignored unless `gnss_aided`.
   void add_gnss(const model::GnssFix& fix);
-  /// False: it came too late to take effect in time; it does so at the next sample.
+  /// False: it is late and is applied at the next sample.
   bool add_correction(const model::VelocityCorrection& correction);
 
-  /// Where the first interval of odometry starts.
+  /// Sets the start of the first interval of odometry.
   void begin(model::Utime utime) { increments_.begin(utime); }
-  /// Motion between two stamps up to which samples have come; intervals in order. None where
-  /// samples are missing.
+  /// Motion between two stamps that samples have reached; intervals in order. None if samples are
+  /// missing.
   std::optional<model::Odometry> increment(model::Utime from, model::Utime to);
 
-  /// News of the level at the last rest, after an increment up to `utime`.
+  /// A new estimate of the level at the last rest, after an increment up to `utime`; none without
+  /// news.
   std::optional<model::RestLevel> rest_news(model::Utime utime);
 
   /// Motion during the last seconds.
@@ -58,14 +58,14 @@ class MotionEstimator {
   model::RawPose raw_pose() const { return pose_.raw_pose(parameters_.gnss_aided); }
   /// Whether the vehicle stands still at the latest IMU sample.
   bool is_stationary() const { return stationary_.is_stationary(); }
-  /// Whether the vehicle was stationary long enough for the gyro's bias to be known.
+  /// Whether the vehicle was stationary long enough to determine the gyro's bias.
   bool is_calibrated() const { return stationary_.is_calibrated(); }
   /// None before the first IMU sample.
   const std::optional<AttitudeFilter>& attitude() const { return levelling_.attitude(); }
-  /// Whether a loaded state is consistent: with an attitude come the samples it was propagated to.
+  /// Whether a loaded state is consistent: an attitude requires the samples it was propagated to.
   bool is_whole() const;
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.lever_, self.levelling_, self.stationary_, self.pose_, self.speeds_, self.constraints_,

@@ -8,7 +8,7 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-/// The state at another time, at its own velocity and rate.
+/// The state extrapolated to another time at its own velocity and rate.
 MotionState moved_on(const MotionState& state, model::Utime utime) {
   MotionState moved = state;
   const double seconds = seconds_between(state.utime, utime);
@@ -23,7 +23,7 @@ MotionState moved_on(const MotionState& state, model::Utime utime) {
   return moved;
 }
 
-/// Over so long the motion after the first state is measured.
+/// Time over which the motion after the first state is measured.
 constexpr model::Utime kBaseline_us = 100'000;
 
 }  // namespace
@@ -61,8 +61,8 @@ std::optional<MotionState> MotionHistory::at(model::Utime utime) const {
   return state;
 }
 
-/// At the first state no velocity was known yet, so what came before goes by how the vehicle moved
-/// soon after. The velocity in the result stays that of the first state.
+/// At the first state the velocity was unknown, so the motion before it is extrapolated from the
+/// motion shortly after. The velocity in the result stays that of the first state.
 MotionState MotionHistory::before_first(model::Utime utime) const {
   const MotionState& first = states_.front();
   if (states_.size() < 2) return moved_on(first, utime);

@@ -1,4 +1,4 @@
-// Where the vehicle was during the last seconds, for points and messages that are older than now.
+// Pose and velocity of the last seconds, for points and messages of the past.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -14,11 +14,11 @@ struct MotionState {
   model::Utime utime = 0;
   Eigen::Quaterniond odom_Q_vehicle = Eigen::Quaterniond::Identity();
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();    ///< In `odom`; z drifts.
-  Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();  ///< Frame vehicle, free of landmarks.
+  Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();  ///< Frame vehicle, without landmarks.
   Eigen::Vector2d level_velocity_mps = Eigen::Vector2d::Zero();  ///< Of the dead reckoning.
-  Eigen::Vector3d rate_rad_s = Eigen::Vector3d::Zero();          ///< Frame vehicle, bias taken out.
-  double heading_rad = 0.0;                                      ///< In `odom`.
-  Eigen::Matrix2d tilt_covariance = Eigen::Matrix2d::Zero();     ///< Of (roll, pitch) [rad^2].
+  Eigen::Vector3d rate_rad_s = Eigen::Vector3d::Zero();       ///< Frame vehicle, bias subtracted.
+  double heading_rad = 0.0;                                   ///< In `odom`.
+  Eigen::Matrix2d tilt_covariance = Eigen::Matrix2d::Zero();  ///< Of (roll, pitch) [rad^2].
 
   /// For saving and loading.
   template <class Archive, class Self>
@@ -36,19 +36,19 @@ class MotionHistory {
   bool empty() const { return states_.empty(); }
   const MotionState& newest() const { return states_.back(); }   ///< Precondition: not empty.
   const MotionState& oldest() const { return states_.front(); }  ///< Precondition: not empty.
-  /// The motion at a time: between two states in proportion to time; after the last one, that one
-  /// moved on at its velocity and rate; before the first, that one moved as between those soon
-  /// after. Extrapolates by `kMostExtrapolation_s` at most. None while empty or farther off.
+  /// The motion at a time: interpolated linearly between two states; after the last one
+  /// extrapolated at its velocity and rate; before the first one with the motion shortly after it.
+  /// Extrapolates by at most `kMostExtrapolation_s`. None if empty or outside that.
   std::optional<MotionState> at(model::Utime utime) const;
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.states_);
   }
 
   static constexpr double kMostExtrapolation_s = 0.5;  ///< Beyond the first or the last state.
-  static constexpr double kKept_s = 4.0;               ///< Older states are forgotten.
+  static constexpr double kKept_s = 4.0;               ///< Older states are removed.
 
  private:
   MotionState before_first(model::Utime utime) const;

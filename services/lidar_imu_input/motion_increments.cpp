@@ -16,7 +16,7 @@ Eigen::Vector2d level_velocity(const MotionState& state) {
   return (level_Q_vehicle * state.velocity_mps).head<2>();
 }
 
-/// A stationary vehicle moves by nothing but what the noise model leaves open.
+/// Motion of a stationary vehicle: zero, with the noise of the model.
 geometry::SE2WithCovariance no_motion(const WheelNoise& noise, double seconds) {
   geometry::SE2WithCovariance motion;
   motion.covariance.diagonal() << square(noise.standstill_sigma_m),
@@ -34,7 +34,7 @@ std::optional<model::Odometry> MotionIncrements::make(model::Utime from, model::
                                                       const IncrementSources& sources) {
   if (to <= from) return std::nullopt;
 
-  // Both are asked: each keeps its own place in time.
+  // Both are called: each keeps its own end of the last interval.
   const std::optional<model::Odometry> wheels = by_wheels(from, to);
   std::optional<model::Odometry> odometry = by_imu(from, to, sources);
   levels_.forget_before(to);
@@ -59,12 +59,12 @@ std::optional<model::Odometry> MotionIncrements::by_imu(model::Utime from, model
   const auto samples = levels_.between(from, to);
   if (!samples) return std::nullopt;
 
-  // Preintegration with the bias learned while stationary; the accelerometer's keeps its prior.
+  // Preintegration with the bias estimated while stationary; the accelerometer's keeps its prior.
   model::Odometry odometry;
   const model::InertialBias bias(sources.stationary.bias().bias_rad_s, 0.0, 0.0);
   odometry.inertial = preintegrate(*samples, parameters_.imu, bias);
 
-  // How the level's error goes on. On a slope a corrected roll rotates the heading with it.
+  // Propagation of the level error. On a slope a correction of the roll rotates the heading, too.
   AttitudeFilter& attitude = *sources.attitude;
   odometry.inertial->level = attitude.level_since_mark();
   odometry.is_stationary = sources.stationary.is_stationary_since(from);
@@ -79,7 +79,7 @@ std::optional<model::Odometry> MotionIncrements::by_imu(model::Utime from, model
   return odometry;
 }
 
-/// From the wheels' speed where there is any; sets `odometry.has_wheels`.
+/// From the wheels' speed, if available; sets `odometry.has_wheels`.
 geometry::SE2WithCovariance MotionIncrements::planar_motion(const std::deque<LevelSample>& samples,
                                                             const IncrementSources& sources,
                                                             model::Odometry& odometry) const {
@@ -102,7 +102,7 @@ geometry::SE2WithCovariance MotionIncrements::dead_reckoned(const std::deque<Lev
   geometry::SE2WithCovariance motion;
   motion.mean = geometry::SE2(velocity * dt + inertial.position_m, inertial.yaw_rad);
 
-  // The velocity's error is correlated: it has the power tau * dt when increments are compounded.
+  // The velocity's error is correlated: its power is tau * dt when increments are compounded.
   const double power = dt * std::max(dt, parameters_.output.velocity_correlation_s);
   const Eigen::Matrix2d rotation = motion.mean.rotation().transpose();
   const Eigen::Matrix2d position =

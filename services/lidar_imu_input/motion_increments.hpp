@@ -1,4 +1,4 @@
-// ODOMETRY: relative motion between two stamps, from IMU and wheels, free of landmarks.
+// ODOMETRY: relative motion between two stamps, from IMU and wheels, without landmarks.
 #pragma once
 
 #include <optional>
@@ -13,35 +13,34 @@
 
 namespace understory::lidar_imu_input {
 
-/// What an increment needs beside the samples that `MotionIncrements` keeps.
+/// Inputs of an increment beside the samples in `MotionIncrements`.
 struct IncrementSources {
-  AttitudeFilter* attitude = nullptr;  ///< Gets a mark at the increment's end; null = none yet.
+  AttitudeFilter* attitude = nullptr;  ///< Marked at the increment's end; null = none yet.
   const WheelSpeeds& speeds;
   const MotionHistory& history;
   const StationaryMonitor& stationary;
 };
 
-/// Keeps the samples since the last increment and makes the next one of them. Invariant: increments
-/// are numbered without gaps.
+/// Stores the samples since the last increment and makes the next one from them. Invariant:
+/// increments are numbered without gaps.
 class MotionIncrements {
  public:
-  /// Noise of IMU and wheels, and where the axle is.
+  /// `parameters`: noise of IMU and wheels, and position of the axle.
   explicit MotionIncrements(const LidarImuInputParameters& parameters);
 
-  /// Takes a levelled IMU sample. Precondition: stamps advance.
+  /// Adds a levelled IMU sample. Precondition: stamps advance.
   void add(const LevelSample& sample) { levels_.add(sample); }
-  /// Takes a wheel sample; one that does not come after its predecessor is ignored.
+  /// Adds a wheel sample; one not later than its predecessor is ignored.
   void add(const model::WheelSample& sample) { wheel_only_.add(sample); }
   /// The first interval starts at `utime`.
   void begin(model::Utime utime) { wheel_only_.advance_to(utime); }
 
-  /// Motion between two stamps up to which samples have come. Intervals are asked for in order.
-  /// With `inertial` where the IMU covers the interval, else by the wheels alone; none where
-  /// samples of both are missing.
+  /// Motion between two stamps that samples have reached; intervals in order. With `inertial` if
+  /// the IMU covers the interval, else by the wheels alone; none if neither covers it.
   std::optional<model::Odometry> make(model::Utime from, model::Utime to,
                                       const IncrementSources& sources);
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.levels_, self.wheel_only_, self.sequence_);

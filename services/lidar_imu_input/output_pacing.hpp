@@ -1,4 +1,4 @@
-// When RAW_POSE goes out, and when a missing calibration is reported.
+// Pacing of RAW_POSE, and the report of a missing calibration.
 #pragma once
 
 #include <optional>
@@ -8,17 +8,17 @@
 
 namespace understory::lidar_imu_input {
 
-/// Lets poses through that are new, at most one per period. Invariant: their stamps advance.
+/// Passes new poses, at most one per period. Invariant: their stamps advance.
 class RawPosePacer {
  public:
   /// `period_s`: `OutputParameters::raw_pose_period_s`.
   explicit RawPosePacer(double period_s);
 
-  /// The pose where it is due. `at_once`: without waiting for the period, as at the end of an
-  /// increment of odometry.
+  /// The pose if it is due. `at_once`: ignoring the period, as at the end of an increment of
+  /// odometry.
   std::optional<model::RawPose> take(const model::RawPose& pose, bool at_once);
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.last_utime_);
@@ -29,13 +29,13 @@ class RawPosePacer {
   std::optional<model::Utime> last_utime_;
 };
 
-/// Reports once that the vehicle moves although it was never stationary long enough to calibrate.
+/// Reports once that the vehicle moves before a standstill long enough for calibration.
 class CalibrationWatch {
  public:
-  /// `imu_is_live`: the IMU has not gone silent. None where there is nothing new to report.
+  /// `imu_is_live`: the IMU is not silent. None without a new report.
   std::optional<InputFault> check(const MotionEstimator& motion, bool imu_is_live);
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.is_reported_);

@@ -1,4 +1,4 @@
-// Parameters of the input stage: where the sensors sit and how good they are.
+// Parameters of the input stage: mounting and accuracy of the sensors.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -8,7 +8,7 @@
 
 namespace understory::lidar_imu_input {
 
-/// Where a sensor sits: vehicle_T_sensor. Rotation: roll, then pitch, then yaw about fixed axes.
+/// Mounting of a sensor: vehicle_T_sensor. Rotation: roll, then pitch, then yaw about fixed axes.
 struct SensorMount {
   double x_m = 0.0;  ///< Forward of the vehicle's origin.
   double y_m = 0.0;  ///< Left of it.
@@ -21,7 +21,7 @@ struct SensorMount {
   Eigen::Vector3d position_m() const { return {x_m, y_m, z_m}; }
   /// vehicle_Q_sensor.
   Eigen::Quaterniond rotation() const;
-  /// Takes sensor coordinates to frame vehicle.
+  /// Transforms sensor coordinates to frame vehicle.
   Eigen::Isometry3d vehicle_T_sensor() const;
 };
 
@@ -35,21 +35,21 @@ struct ImuParameters {
   double gyro_bias_walk = 3e-5;     ///< [rad/s/sqrt(s)]
   double force_bias_walk = 3e-4;    ///< [m/s^2/sqrt(s)]
   double gyro_scale_sigma = 0.002;  ///< Relative error of the rate.
-  double level_noise = 5e-3;       ///< Of removed gravity, from the level's error [m/s^2/sqrt(Hz)].
-  double gyro_range_rad_s = 8.0;   ///< A rate this large is saturated.
-  double force_range_mps2 = 78.0;  ///< A force this large is saturated.
-  double saturation_gyro_noise = 2.0;    ///< Across left-out samples [rad/s/sqrt(Hz)].
-  double saturation_force_noise = 20.0;  ///< Across left-out samples [m/s^2/sqrt(Hz)].
-  double max_gap_s = 0.15;               ///< Samples farther apart are not joined.
+  double level_noise = 5e-3;  ///< Of the subtracted gravity, from the level error [m/s^2/sqrt(Hz)].
+  double gyro_range_rad_s = 8.0;         ///< A rate this large is saturated.
+  double force_range_mps2 = 78.0;        ///< A force this large is saturated.
+  double saturation_gyro_noise = 2.0;    ///< Across omitted samples [rad/s/sqrt(Hz)].
+  double saturation_force_noise = 20.0;  ///< Across omitted samples [m/s^2/sqrt(Hz)].
+  double max_gap_s = 0.15;               ///< Samples at a larger distance in time are not joined.
 };
 
-/// Over so long the rate is differenced to take out the force that the IMU feels when the vehicle
-/// rotates about its origin.
+/// Time over which the rate is differentiated, for the force at the IMU when the vehicle rotates
+/// about its origin.
 constexpr double kLeverBaseline_s = 0.02;
 
-/// When the vehicle counts as stationary, and the calibration that this allows.
+/// Detection of standstills, and their use for calibration.
 struct StandstillParameters {
-  double window_s = 0.5;             ///< Length of the samples that are looked at.
+  double window_s = 0.5;             ///< Length of the examined samples.
   double gyro_sigma_rad_s = 0.02;    ///< Largest spread of the rate in the window.
   double force_sigma_mps2 = 0.25;    ///< Largest spread of the force in the window.
   double gyro_mean_rad_s = 0.06;     ///< Largest mean rate, before the bias is known.
@@ -59,7 +59,7 @@ struct StandstillParameters {
   double velocity_sigma_mps = 0.01;  ///< Of velocity zero at a standstill.
 };
 
-/// What a car does not do, as measurements of its velocity.
+/// Kinematic constraints of a car, as measurements of its velocity.
 struct ConstraintParameters {
   bool nonholonomic = true;         ///< Wheels do not slip sideways, nor leave the ground.
   double side_slip_mps = 0.05;      ///< Sideways velocity of the axle, sigma.
@@ -71,43 +71,43 @@ struct ConstraintParameters {
   double period_s = 0.1;            ///< Between two uses: their errors are correlated.
 };
 
-/// The laser that scans in space.
+/// The 3-D laser.
 struct DeskewParameters {
   SensorMount mount;
   double revolution_s = 0.1;  ///< Time of one revolution, for sweeps without times.
   /// Sweeps without times get them from the azimuth: "none", "clockwise", "counterclockwise".
   std::string times_from_azimuth = "none";
-  /// How its points come, seen from above in its own frame: "any" is not checked.
+  /// Direction of its points, seen from above in its own frame: "any" is not checked.
   std::string turns = "any";
   double min_range_m = 0.0;  ///< Nearer points are on the vehicle itself.
 };
 
-/// The laser that scans one plane.
+/// The one-plane laser.
 struct PlanarLaserParameters {
   SensorMount mount;
 };
 
-/// When results go out.
+/// Timing of the outputs.
 struct OutputParameters {
   double max_increment_s = 0.1;         ///< Longest increment of odometry.
-  double lag_s = 0.15;                  ///< How long an increment waits for a sweep to end it.
-  double max_wait_s = 0.3;              ///< How long a sweep waits for motion.
+  double lag_s = 0.15;                  ///< Time that an increment waits for a sweep to end it.
+  double max_wait_s = 0.3;              ///< Time that a sweep waits for motion.
   double raw_pose_period_s = 0.02;      ///< Between two RAW_POSE.
   double correction_delay_s = 0.15;     ///< [D] From a correction's stamp to its effect.
   double velocity_correlation_s = 5.0;  ///< Correlation time of the dead-reckoned velocity's error.
 };
 
-/// When a sensor counts as faulty.
+/// Limits for faults of a sensor.
 struct FaultParameters {
-  double silent_s = 0.3;        ///< IMU or wheels without a sample for so long.
+  double silent_s = 0.3;        ///< IMU or wheels without a sample for this time.
   double sweep_silent_s = 0.3;  ///< The same for the lasers.
-  double frozen_s = 0.5;        ///< The same IMU sample for so long.
-  double clock_jump_s = 0.5;    ///< Stamps that go back, or lead the others, by more.
-  int resync_samples = 5;       ///< So many stamps that go on evenly: the clock is followed.
-  double reorder_s = 0.025;     ///< How long a sample waits for one before it that is missing.
+  double frozen_s = 0.5;        ///< Equal IMU samples for this time.
+  double clock_jump_s = 0.5;    ///< Stamps that go back, or are ahead of the others, by more.
+  int resync_samples = 5;    ///< Number of evenly spaced stamps after which the clock is followed.
+  double reorder_s = 0.025;  ///< Time that a sample waits for a missing earlier one.
 };
 
-/// Sensors that the vehicle has: HEALTH is not OK where one never comes.
+/// Sensors of the vehicle: HEALTH is not OK if one of them never sends.
 struct ExpectedSensors {
   bool imu = false;
   bool wheels = false;
@@ -126,7 +126,7 @@ struct LidarImuInputParameters {
   OutputParameters output;
   FaultParameters fault;
   ExpectedSensors expected;
-  bool gnss_aided = false;  ///< RAW_POSE takes velocity from GNSS: a reference, not for mapping.
+  bool gnss_aided = false;  ///< RAW_POSE gets its velocity from GNSS: a reference, not for mapping.
 };
 
 }  // namespace understory::lidar_imu_input

@@ -9,7 +9,7 @@ namespace understory::lidar_imu_input {
 
 void PoseTrack::propagate(const LevelSample& from, const LevelSample& to, double climb_mps,
                           double seconds) {
-  // Where the sample comes late the wheels have moved the pose over a part of its time.
+  // If the sample is late, the wheels have moved the pose over a part of its time.
   const model::Utime reached = std::clamp(utime_.value_or(from.utime), from.utime, to.utime);
   const LevelSample middle = interpolate(from, to, reached);
   if (reached > from.utime) reckoning_.propagate_velocity(from, middle);
@@ -19,7 +19,7 @@ void PoseTrack::propagate(const LevelSample& from, const LevelSample& to, double
 }
 
 void PoseTrack::bridge_gap(model::Utime utime, double yaw_rate_rad_s) {
-  // What the wheels have not covered.
+  // Time not covered by the wheels.
   const double open = std::max(0.0, seconds_between(*utime_, utime));
   const Eigen::Vector2d& v = reckoning_.velocity();
   geometry::SE2WithCovariance motion{
@@ -37,12 +37,12 @@ void PoseTrack::follow_wheels(const model::Odometry& odometry) {
   const model::Utime reached = std::max(from, utime_.value_or(from));
   if (reached >= to) return;
 
-  // The part of the motion that is still open.
+  // Share of the motion not applied yet.
   const double share = seconds_between(reached, to) / seconds_between(from, to);
   reckoning_.bridge(
       {geometry::SE2::Exp(share * odometry.from_T_to.Log()), share * odometry.covariance});
 
-  // Tilt and height stay as they were last known; the tilt is less and less certain.
+  // Tilt and height stay at their last values; the uncertainty of the tilt grows.
   if (history_.empty()) history_.add({.utime = reached});
   MotionState state = history_.newest();
   state.utime = to;

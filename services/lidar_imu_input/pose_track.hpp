@@ -1,4 +1,4 @@
-// Where the vehicle is by dead reckoning, and where it was during the last seconds.
+// Pose of the vehicle by dead reckoning, now and during the last seconds.
 #pragma once
 
 #include <optional>
@@ -20,27 +20,27 @@ class PoseTrack {
 
   /// From one levelled sample to the next, `seconds` later. `climb_mps`: vertical velocity.
   void propagate(const LevelSample& from, const LevelSample& to, double climb_mps, double seconds);
-  /// Up to `utime` no sensor covered the motion: velocity and `yaw_rate_rad_s` go on as they were.
+  /// Bridges the time up to `utime` without sensors: velocity and `yaw_rate_rad_s` stay constant.
   void bridge_gap(model::Utime utime, double yaw_rate_rad_s);
-  /// Follows odometry that the wheels alone gave, as far as the IMU has not moved the pose.
+  /// Follows odometry from the wheels alone, as far as the IMU has not moved the pose.
   void follow_wheels(const model::Odometry& odometry);
   /// The IMU has moved the pose up to `utime`.
   void reach(model::Utime utime);
   /// The motion at the latest IMU sample (frame vehicle).
   MotionState state_at(const model::ImuSample& sample, const AttitudeFilter& attitude) const;
-  /// Puts the motion at an IMU sample (frame vehicle) into the history.
+  /// Adds the motion at an IMU sample (frame vehicle) to the history.
   void remember(const model::ImuSample& sample, const AttitudeFilter& attitude);
 
-  /// To be updated with measurements.
+  /// For updates with measurements.
   DeadReckoning& reckoning() { return reckoning_; }
-  /// Pose, velocity and biases as they are.
+  /// Present pose, velocity and biases.
   const DeadReckoning& reckoning() const { return reckoning_; }
   /// Motion during the last seconds.
   const MotionHistory& history() const { return history_; }
   /// RAW_POSE. `is_reference`: corrected by GNSS, not for mapping.
   model::RawPose raw_pose(bool is_reference) const;
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.reckoning_, self.history_, self.utime_, self.height_m_);

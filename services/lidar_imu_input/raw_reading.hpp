@@ -1,4 +1,4 @@
-// One message of a sensor, as it comes from the bus.
+// One message of a sensor, as received from the bus.
 #pragma once
 
 #include <concepts>
@@ -16,26 +16,25 @@ namespace understory::lidar_imu_input {
 using RawReading = std::variant<model::ImuSample, model::WheelSample, model::GnssFix,
                                 model::PointSweep, model::PlanarScan>;
 
-/// Which sensor it is of.
+/// The sensor of a reading.
 inline Sensor sensor_of(const RawReading& reading) { return static_cast<Sensor>(reading.index()); }
 /// Its stamp on the sensor's own clock.
 inline model::Utime stamp_of(const RawReading& reading) {
   return std::visit([](const auto& value) { return value.utime; }, reading);
 }
-/// When it was complete: the end of a revolution, else its stamp.
+/// Time of its completion: the end of a revolution, else its stamp.
 inline model::Utime end_of(const RawReading& reading) {
   if (const auto* sweep = std::get_if<model::PointSweep>(&reading))
     return end_of_revolution(*sweep);
   if (const auto* scan = std::get_if<model::PlanarScan>(&reading)) return scan->end();
   return stamp_of(reading);
 }
-/// The number that its sender gave it.
+/// Its sender's sequence number.
 inline std::uint64_t sequence_of(const RawReading& reading) {
   return std::visit([](const auto& value) { return value.sequence; }, reading);
 }
 
-/// A reading of the sensor with nothing in it. Throws std::invalid_argument for a number that is
-/// none of a sensor.
+/// An empty reading of the sensor. Throws std::invalid_argument for an invalid number of a sensor.
 inline RawReading empty_reading(Sensor sensor) {
   switch (sensor) {
     case Sensor::kImu:
@@ -53,7 +52,7 @@ inline RawReading empty_reading(Sensor sensor) {
   }
 }
 
-/// A reading that waits; saved without the points of sweeps, which are bulk and no state.
+/// A waiting reading; saved without the points of sweeps, which are bulk data.
 struct HeldReading {
   RawReading reading;
 

@@ -5,16 +5,16 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-/// A standard deviation that is smaller or larger by a tenth is worth a message, and
+/// Ratio of variances that triggers a message: a standard deviation changed by a tenth,
 constexpr double kTenth = 0.81;
-/// so is a second of rest [us].
+/// or a second of rest has passed [us].
 constexpr model::Utime kEvery = 1'000'000;
-/// A twentieth of a millimetre at breast height [rad^2].
+/// 0.05 mm at breast height [rad^2].
 constexpr double kLeast_rad2 = 1.6e-9;
 
 bool is_other(double now, double before) { return now < kTenth * before || before < kTenth * now; }
 
-/// Of what the error at rest does to where the vehicle is now [rad^2].
+/// Effect of the error at rest on the vehicle's present position [rad^2].
 double size_of(const model::RestLevel& level) {
   return std::max(kLeast_rad2, std::min(level.covariance.trace(), level.change_covariance.trace()));
 }

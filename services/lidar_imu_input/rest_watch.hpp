@@ -1,5 +1,4 @@
-// REST_LEVEL: when the vehicle was last stationary, and what its motion has shown of the level
-// since.
+// REST_LEVEL: time of the last rest, and the level error at it, estimated from later motion.
 #pragma once
 
 #include <algorithm>
@@ -10,18 +9,18 @@
 
 namespace understory::lidar_imu_input {
 
-/// Owns the times of the last rest, and what was published of its level last.
+/// Owns the times of the last rest, and the last published level.
 class RestWatch {
  public:
-  /// The vehicle is stationary at `utime`, and has been since `from`.
+  /// The vehicle is stationary at `utime`, since `from`.
   void add_stationary(model::Utime from, model::Utime utime);
-  /// The vehicle was stationary until `utime` only.
+  /// Corrects the end of the rest to `utime`.
   void go_back(model::Utime utime) { until_ = std::min(until_, utime); }
-  /// What the attitude's filter knows of the level at the last rest, where a standard deviation has
-  /// changed by a tenth since the last call that gave something, and once a second at rest.
+  /// The attitude filter's estimate of the level at the last rest, if a standard deviation has
+  /// changed by a tenth since the last one returned, and once a second at rest.
   std::optional<model::RestLevel> news(model::Utime utime, const AttitudeFilter& attitude);
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.from_, self.until_, self.published_, self.sequence_);

@@ -8,8 +8,8 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-constexpr model::Utime kSmallOffset_us = 20'000;  // not to be distinguished from jitter
-/// A sensor's first stamp may be so far behind the others'.
+constexpr model::Utime kSmallOffset_us = 20'000;  // indistinguishable from jitter
+/// Largest lag of a sensor's first stamp behind the others'.
 constexpr double kLargestLag_s = 10.0;
 
 }  // namespace
@@ -22,19 +22,19 @@ bool SensorClock::is_plausible(model::Utime utime, std::optional<model::Utime> o
   const double step = seconds_between(*last_, utime);
   if (step < -parameters_.clock_jump_s) return false;
   if (step <= longest_step_s() || !others) return true;
-  // A long pause is silence where the others' time has gone on as well, else a jump.
+  // A long pause is silence if the others' time has advanced as well, else a jump.
   return seconds_between(*others, utime) <= parameters_.clock_jump_s;
 }
 
 SensorClock::Answer SensorClock::take(model::Utime raw, std::optional<model::Utime> others) {
   const model::Utime utime = raw + offset_;
-  // Once in quarantine, only a stamp that goes on behind the last good one ends it early.
+  // In quarantine, only a stamp that continues the last good one ends it early.
   const bool suspected = first_candidate_ && last_ && utime <= *last_;
   if (suspected || !is_plausible(utime, others)) return quarantine(raw, others);
   first_candidate_.reset();
   if (last_ && utime <= *last_) return {Verdict::kLate, utime};
 
-  // A pause says nothing of the sensor's period.
+  // A pause is not used for the sensor's period.
   const bool is_pause =
       last_ && period_us_ > 0.0 && seconds_between(*last_, utime) > longest_step_s();
   if (last_ && !is_pause) {
@@ -60,7 +60,7 @@ SensorClock::Answer SensorClock::quarantine(model::Utime raw, std::optional<mode
   const bool long_enough = agreeing_ >= 2 && seconds_between(*first_candidate_, raw) >= 1.0;
   if (agreeing_ < parameters_.resync_samples && !long_enough) return {Verdict::kQuarantined, 0};
 
-  // From now on the stamps are moved so that they continue the good ones, or those of the others.
+  // From now on an offset makes the stamps continue the good ones, or those of the others.
   if (last_) {
     offset_ = *last_ + static_cast<model::Utime>(std::llround(period_us_)) - *first_candidate_;
     if (std::abs(offset_) < kSmallOffset_us && raw > *last_) offset_ = 0;

@@ -1,5 +1,5 @@
-// Differences of stamps, squares, and bounds of a motion that nothing has measured: what every file
-// of this room needs.
+// Differences of stamps, squares, and bounds of an unmeasured motion: used by all files of this
+// folder.
 #pragma once
 
 #include <cmath>
@@ -8,7 +8,7 @@
 
 namespace understory::lidar_imu_input {
 
-/// Time from one stamp to another [s]; negative where `to` is earlier.
+/// Time from one stamp to another [s]; negative if `to` is earlier.
 inline double seconds_between(model::Utime from, model::Utime to) {
   return static_cast<double>(to - from) * 1e-6;
 }
@@ -23,7 +23,7 @@ inline double square(double value) { return value * value; }
 
 /// Standard deviation of each component of an unknown velocity.
 inline constexpr double kStartSpeed_mps = 10.0;
-/// How an unmeasured velocity spreads over a gap [m/s per square root of a second].
+/// Growth of an unmeasured velocity's sigma over a gap [m/s per square root of a second].
 inline constexpr double kBridgeSpeed = 2.0;
 
 }  // namespace understory::lidar_imu_input

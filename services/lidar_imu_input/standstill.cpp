@@ -6,7 +6,7 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-constexpr int kFloorWindows = 200;  // windows that show how quiet the IMU is at rest
+constexpr int kFloorWindows = 200;  // windows for the IMU's noise at rest
 constexpr std::size_t kFewestSamples = 5;
 
 /// Mean and spread over a window.
@@ -45,7 +45,7 @@ bool StandstillDetector::is_quiet(const std::optional<Eigen::Vector3d>& gyro_bia
   const Spread force = spread_of(
       window_, [](const model::ImuSample& s) -> const auto& { return s.specific_force_mps2; });
 
-  // Limits: those of this IMU at rest, once they are known.
+  // Limits: this IMU's noise at rest, once it is known.
   const bool floor_known = floor_windows_ >= kFloorWindows;
   const double most_gyro = floor_known ? std::min(parameters_.gyro_sigma_rad_s,
                                                   parameters_.floor_factor * gyro_floor_ + 1e-4)
@@ -54,7 +54,7 @@ bool StandstillDetector::is_quiet(const std::optional<Eigen::Vector3d>& gyro_bia
                                                    parameters_.floor_factor * force_floor_ + 1e-3)
                                         : parameters_.force_sigma_mps2;
 
-  // A known bias leaves little room: a slow, smooth curve is no standstill.
+  // With a known bias the limit is narrow: a slow, smooth curve is no standstill.
   const Eigen::Vector3d rate = gyro.mean - gyro_bias.value_or(Eigen::Vector3d::Zero());
   const double most_rate =
       gyro_bias ? 0.1 * parameters_.gyro_mean_rad_s : parameters_.gyro_mean_rad_s;

@@ -1,4 +1,4 @@
-// Whether the vehicle is stationary, from its sensors.
+// Detects standstills from the sensors.
 #pragma once
 
 #include <deque>
@@ -9,32 +9,32 @@
 
 namespace understory::lidar_imu_input {
 
-/// Looks at a short window of IMU samples (and at the wheels, where there are any). While the
-/// vehicle is stationary for the first time, learns how quiet this IMU is on this vehicle at rest,
-/// and demands that later.
+/// Examines a short window of IMU samples (and the wheels, if there are any). During the first
+/// standstill it estimates the noise of this IMU on this vehicle at rest, and later uses that as a
+/// limit.
 class StandstillDetector {
  public:
   /// Limits of a quiet window.
   explicit StandstillDetector(const StandstillParameters& parameters) : parameters_(parameters) {}
 
-  /// Takes a sample in frame vehicle. `gyro_bias` [rad/s]: none before it is known.
-  /// `may_be_stationary`: false where the velocity is known well enough to exclude it.
+  /// Adds a sample in frame vehicle. `gyro_bias` [rad/s]: none before it is known.
+  /// `may_be_stationary`: false if the known velocity excludes it.
   void add(const model::ImuSample& sample, const std::optional<Eigen::Vector3d>& gyro_bias,
            bool may_be_stationary = true);
-  /// Takes the speed of the wheels [m/s]: wheels that turn exclude a standstill for `window_s`.
+  /// Adds the speed of the wheels [m/s]: turning wheels exclude a standstill for `window_s`.
   void add_wheel_speed(model::Utime utime, double speed_mps);
-  void reset();  ///< Forgets the window, after a gap.
+  void reset();  ///< Clears the window, after a gap.
 
   /// At the latest sample.
   bool is_stationary() const { return is_stationary_; }
-  /// For how long without a break, up to the latest sample [s]; 0 while it moves.
+  /// Duration without a break, up to the latest sample [s]; 0 while the vehicle moves.
   double stationary_s() const;
   /// Length of the longest standstill so far [s].
   double longest_s() const { return longest_s_; }
-  /// Whether one of at least `calibration_s` was found.
+  /// Whether there was a standstill of at least `calibration_s`.
   bool is_calibrated() const { return longest_s_ >= parameters_.calibration_s; }
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.window_, self.is_stationary_, self.since_, self.longest_s_, self.wheels_turned_,
@@ -48,13 +48,13 @@ class StandstillDetector {
   StandstillParameters parameters_;
   std::deque<model::ImuSample> window_;
   bool is_stationary_ = false;
-  model::Utime since_ = 0;  ///< Begin of the present standstill.
+  model::Utime since_ = 0;  ///< Start of the present standstill.
   double longest_s_ = 0.0;
-  model::Utime wheels_turned_ = 0;  ///< When the wheels last turned.
+  model::Utime wheels_turned_ = 0;  ///< Time at which the wheels last turned.
   bool has_turned_ = false;
-  double gyro_floor_ = 0.0;   ///< Mean spread at rest [rad/s]; 0 = not known yet.
+  double gyro_floor_ = 0.0;   ///< Mean spread at rest [rad/s]; 0 = unknown.
   double force_floor_ = 0.0;  ///< The same of the force [m/s^2].
-  int floor_windows_ = 0;     ///< Windows that these were learned from.
+  int floor_windows_ = 0;     ///< Number of windows in these means.
 };
 
 }  // namespace understory::lidar_imu_input

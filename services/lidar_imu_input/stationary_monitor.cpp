@@ -9,9 +9,9 @@ namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kBiasKnown_s = 3.0;    // of standstill
-constexpr double kStillSigmas = 4.0;    // from zero, that a stationary vehicle's velocity may seem
-constexpr double kCorrected_s = 2.0;    // for so long the filter's corrections count
-constexpr double kInsistence_s = 10.0;  // then a velocity that nothing corrects is taken as wrong
+constexpr double kStillSigmas = 4.0;    // largest apparent velocity of a stationary vehicle
+constexpr double kCorrected_s = 2.0;    // validity of the filter's corrections
+constexpr double kInsistence_s = 10.0;  // then an uncorrected velocity is taken as wrong
 
 }  // namespace
 
@@ -50,8 +50,8 @@ void StationaryMonitor::learn_bias(const AttitudeFilter& attitude) {
   bias_.sigma_rad_s = std::sqrt(down.dot(attitude.gyro_bias_covariance() * down));
 }
 
-/// Without wheels only quiet samples show a standstill. There the velocity that the filter corrects
-/// by its landmarks must agree.
+/// Without wheels only quiet samples indicate a standstill. Then the velocity, corrected by the
+/// filter's landmarks, must agree.
 bool StationaryMonitor::allows_stationary(model::Utime now, const VelocityEvidence& velocity) {
   const double slow = parameters_.wheel_speed_mps;
   const Eigen::Matrix2d spread =

@@ -9,12 +9,12 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-/// Clocks that go back by less were set, and are followed: the vehicle drives on where it was.
+/// Clocks that go back by less were set, and are followed: the vehicle continues at its place.
 constexpr double kFarBack_s = 10.0;
 constexpr double kStepDoubt_s = 1.0;
-/// Readings in a row that are farther apart are of no common time.
+/// Readings with larger steps in between have no common time.
 constexpr double kTogether_s = 1.5;
-/// Between the old time and the new one: the filter says that its pose jumps.
+/// Gap between the old time and the new one: the filter reports a jump of its pose.
 constexpr double kStepGap_s = 2.0;
 constexpr std::size_t kMostBehind = 1000;
 
@@ -30,7 +30,7 @@ AfterStepBack StepBack::take(RawReading reading, const InputGuard& guard) {
   const Sensor sensor = sensor_of(reading);
   if (sensor == Sensor::kGnss || !now) return {{std::move(reading)}, {}};
 
-  // The old time goes on: what was held is of one sensor.
+  // The old time continues: the held readings are of one sensor.
   const model::Utime end = guard.on_stage_time(sensor, end_of(reading));
   AfterStepBack after;
   const bool is_apart = !held_.empty() && std::abs(seconds_between(end_of(held_.back()),
@@ -47,7 +47,7 @@ AfterStepBack StepBack::take(RawReading reading, const InputGuard& guard) {
   if (seconds_between(first, end_of(held_.back())) < kStepDoubt_s || !has_all_live(guard))
     return after;
 
-  // Behind all that was used so far.
+  // After all readings used so far.
   const model::Utime by_us = *now + microseconds(kStepGap_s) - first;
   moved_us_ += by_us;
   for (RawReading& one : held_) move(one, by_us);

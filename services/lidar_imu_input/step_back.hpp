@@ -1,4 +1,4 @@
-// All clocks go far back at once: another recording is played.
+// A large step back of all clocks: another recording is played.
 #pragma once
 
 #include <optional>
@@ -9,25 +9,24 @@
 
 namespace understory::lidar_imu_input {
 
-/// What one reading leads to.
+/// Result of one reading.
 struct AfterStepBack {
-  std::vector<RawReading> readings;  ///< To be taken now, in order of arrival.
-  std::optional<double> back_s;      ///< All clocks have gone back by so much [s].
+  std::vector<RawReading> readings;  ///< To be used now, in order of arrival.
+  std::optional<double> back_s;      ///< Step back of all clocks [s].
 };
 
-/// Holds readings back that are far behind all others. Where a second goes by in them, every live
-/// sensor is among them, and none goes on at the old time, nobody knows where the vehicle is now:
-/// stamps are moved so that time goes on behind a gap. Else they are left to `InputGuard`: the
-/// clock of one sensor that jumped, or a sensor whose messages come late in one burst. GNSS proves
-/// nothing.
+/// Holds readings back that are far behind all others. If they span a second, contain every live
+/// sensor, and none continues at the old time, the vehicle's pose is unknown: an offset is added to
+/// the stamps, so that time continues after a gap. Else they are passed to `InputGuard`: the clock
+/// of one sensor jumped, or a sensor's messages arrive late in one burst. GNSS is no evidence.
 class StepBack {
  public:
-  /// Takes a reading as it came; what it gives is on the time that never goes back.
+  /// Adds a raw reading; the result is in the time that never goes back.
   AfterStepBack take(RawReading reading, const InputGuard& guard);
-  /// All that is held, at the end of the drive.
+  /// All held readings, at the end of the drive.
   std::vector<RawReading> finish();
 
-  /// For saving and loading: what changes while it runs. Readings that are held are lost.
+  /// Members of a saved state; see common/state. The rest is configuration. Held readings are lost.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.moved_us_);

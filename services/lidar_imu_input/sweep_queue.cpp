@@ -9,10 +9,10 @@ namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::size_t kMostWaiting = 20;
-/// A sweep may be carried so far ahead of its own end.
+/// Largest change of a sweep's stamp beyond its own end.
 constexpr model::Utime kLongestCarry_us = 250'000;
 
-/// A scan taken at once is published with its own stamp.
+/// A scan taken in one instant is published with its own stamp.
 bool can_be_carried(const WaitingSweep& waiting) {
   const auto* scan = std::get_if<model::PlanarScan>(&waiting.item);
   return scan == nullptr || has_beam_times(*scan);

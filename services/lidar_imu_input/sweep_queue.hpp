@@ -1,4 +1,4 @@
-// Sweeps and scans that wait until the motion of their time is known.
+// Sweeps and scans that wait for their motion.
 #pragma once
 
 #include <deque>
@@ -11,15 +11,15 @@
 
 namespace understory::lidar_imu_input {
 
-/// A sweep whose points were lost at a restart: its increment of odometry still ends there.
+/// A sweep whose points were lost at a restart: an increment of odometry still ends at its stamp.
 struct LostSweep {};
 
 /// One item of the queue.
 struct WaitingSweep {
-  model::Utime end = 0;  ///< When its last point was measured.
+  model::Utime end = 0;  ///< Time of its last point.
   std::variant<LostSweep, model::PointSweep, model::PlanarScan> item;
 
-  /// Points of sweeps are bulk and no state: a sweep is saved as a lost one.
+  /// Points of sweeps are bulk data: a sweep is saved as a lost one.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     std::optional<model::PlanarScan> scan;
@@ -31,32 +31,32 @@ struct WaitingSweep {
   }
 };
 
-/// What became of an item that was put into the queue.
+/// Result of adding an item to the queue.
 struct Admission {
-  bool is_carried = false;          ///< It came late: its stamp is the end of the latest increment.
+  bool is_carried = false;          ///< It is late: its stamp is the end of the latest increment.
   bool dropped_oldest = false;      ///< The queue was full.
-  std::optional<InputFault> fault;  ///< It came too late and was dropped.
+  std::optional<InputFault> fault;  ///< It is too late and was dropped.
 };
 
-/// Invariant: items are in order of their ends; at most 20 wait; stamps that were released advance.
+/// Invariant: items are in order of their ends; at most 20 wait; released stamps advance.
 class SweepQueue {
  public:
-  /// Puts an item in its place. `increment_end`: where the latest odometry ended. An increment that
-  /// was published is not taken back: what is to be de-skewed and ends before it is carried to it,
-  /// by at most 0.25 s; a scan taken at once is dropped.
+  /// Adds an item in order. `increment_end`: end of the latest odometry. A published increment is
+  /// not changed: an item to be de-skewed that ends before it is moved to its end, by at most
+  /// 0.25 s; a scan taken in one instant is dropped.
   Admission add(WaitingSweep waiting, std::optional<model::Utime> increment_end);
 
   /// Whether nothing waits.
   bool empty() const { return waiting_.empty(); }
   /// Precondition: not empty.
   const WaitingSweep& front() const { return waiting_.front(); }
-  /// Takes the first item out. Precondition: not empty.
+  /// Removes and returns the first item. Precondition: not empty.
   WaitingSweep take();
-  /// Whether an item may be published: its points are there, and its stamp is new. If so the stamp
-  /// counts as released.
+  /// Whether an item may be published: it has its points and a new stamp. If so the stamp counts as
+  /// released.
   bool release(const WaitingSweep& waiting);
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.waiting_, self.sweep_stamp_, self.scan_stamp_);
@@ -64,7 +64,7 @@ class SweepQueue {
 
  private:
   std::deque<WaitingSweep> waiting_;
-  std::optional<model::Utime> sweep_stamp_;  ///< Of the latest sweep that was released.
+  std::optional<model::Utime> sweep_stamp_;  ///< Of the latest released sweep.
   std::optional<model::Utime> scan_stamp_;   ///< The same of scans.
 };
 

@@ -12,11 +12,11 @@ namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::size_t kMostHeld = 1000;
-/// Of one sensor alone, at the start.
+/// Largest step of a single sensor, at the start.
 constexpr double kLongestFirstStep_s = 10.0;
-/// So long a sensor goes on by itself until the silence of the others is believed to be a pause.
+/// Time for which one sensor must continue alone until the silence of the others counts as a pause.
 constexpr double kLongestDoubt_s = 1.0;
-/// Readings that were held for so long belong to the same time.
+/// Readings held within this time belong together.
 constexpr double kSameTime_s = 1.5;
 
 model::Utime stage_end(const RawReading& reading, const InputGuard& guard) {
@@ -30,7 +30,7 @@ BelievedReadings TimeBase::take(RawReading reading, InputGuard& guard,
   const std::optional<model::Utime> now = guard.time();
   const bool proves = sensor_of(reading) != Sensor::kGnss;
   if (now && !(proves && is_ahead(reading, guard))) {
-    // The old time goes on: what was held is a clock that jumped.
+    // The old time continues: the held readings are of a clock that jumped.
     BelievedReadings believed;
     if (proves && stage_end(reading, guard) > *now) believed.readings = finish();
     believed.readings.push_back(std::move(reading));
@@ -55,7 +55,7 @@ bool TimeBase::is_ahead(const RawReading& reading, const InputGuard& guard) cons
          guard.longest_step_s(sensor_of(reading));
 }
 
-/// How many of the newest reading's sensor go on evenly up to it.
+/// Number of the newest reading's sensor's readings, evenly spaced up to it.
 int TimeBase::evenly_before_newest(const InputGuard& guard, double longest_step_s) const {
   const Sensor sensor = sensor_of(held_.back().reading);
   int count = 0;
@@ -76,7 +76,7 @@ bool TimeBase::is_proven(const InputGuard& guard) const {
   const Sensor sensor = sensor_of(newest);
   const model::Utime end = stage_end(newest, guard);
 
-  // Another sensor that says the same, or something else?
+  // Does another sensor agree or contradict?
   bool is_contested = false;
   model::Utime first = end;
   for (const HeldReading& held : held_) {
@@ -88,7 +88,7 @@ bool TimeBase::is_proven(const InputGuard& guard) const {
     is_contested = true;
   }
 
-  // By itself.
+  // A single sensor.
   if (!guard.time()) {
     const int enough = is_contested ? parameters_.resync_samples : 1;
     return evenly_before_newest(guard, parameters_.clock_jump_s) >= enough ||
@@ -99,10 +99,10 @@ bool TimeBase::is_proven(const InputGuard& guard) const {
   return evenly >= 1 && (is_alone || seconds_between(first, end) >= kLongestDoubt_s);
 }
 
-/// The newest one that is held is right: those that agree with it are used.
+/// The newest held reading is correct: the readings that agree with it are used.
 BelievedReadings TimeBase::go_on(InputGuard& guard, std::vector<InputFault>& faults) {
   const model::Utime end = stage_end(held_.back().reading, guard);
-  // One slow sensor alone has taken its time.
+  // A single slow sensor has needed its time.
   const Sensor sensor = sensor_of(held_.back().reading);
   const bool is_alone = std::ranges::all_of(held_, [sensor](const HeldReading& held) {
     return sensor_of(held.reading) == sensor || sensor_of(held.reading) == Sensor::kGnss;

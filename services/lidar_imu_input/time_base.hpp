@@ -1,4 +1,4 @@
-// Where the sensors' time is: found at the start, and after a pause of all of them.
+// Determines the sensors' time at the start, and after a pause of all of them.
 #pragma once
 
 #include <deque>
@@ -10,29 +10,29 @@
 
 namespace understory::lidar_imu_input {
 
-/// What one reading leads to.
+/// Result of one reading.
 struct BelievedReadings {
   std::vector<RawReading> readings;  ///< To be used now, in order of arrival.
-  /// All sensors were silent for so long [s], or this process did not run: time goes on.
+  /// Silence of all sensors, or time during which this process did not run [s]: time continues.
   std::optional<double> pause_s;
 };
 
-/// Holds readings back whose stamps nothing else supports: the first ones of a drive, and those far
-/// ahead of all that came before. Two sensors that agree, or one alone that goes on evenly, are
-/// time. Where another sensor goes on at the old time, those that were held are a clock that jumped
-/// and are left to `InputGuard`. GNSS proves nothing: receivers start with wrong dates. Invariant:
-/// at most 1000 readings are held.
+/// Holds readings back whose stamps have no support: the first ones of a drive, and those far ahead
+/// of all earlier ones. Two sensors that agree, or a single one with evenly spaced stamps,
+/// determine the time. If another sensor continues at the old time, the held readings are of a
+/// clock that jumped, and are passed to `InputGuard`. GNSS is no evidence: receivers start with
+/// wrong dates. Invariant: at most 1000 readings are held.
 class TimeBase {
  public:
-  /// What counts as a jump.
+  /// `parameters`: size of a jump.
   explicit TimeBase(const FaultParameters& parameters) : parameters_(parameters) {}
 
-  /// Takes a reading; `guard` hears of a pause. `faults` gets those that are left out.
+  /// Adds a reading; reports a pause to `guard`. `faults` gets the dropped readings.
   BelievedReadings take(RawReading reading, InputGuard& guard, std::vector<InputFault>& faults);
-  /// All that is held, at the end of the drive.
+  /// All held readings, at the end of the drive.
   std::vector<RawReading> finish();
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.held_);

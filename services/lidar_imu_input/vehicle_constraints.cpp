@@ -30,7 +30,7 @@ void VehicleConstraints::apply(const model::ImuSample& sample, double level_yaw_
   constrained_utime_ = sample.utime;
   if (parameters_.nonholonomic) exclude_slip(sample, level_yaw_rate_rad_s, attitude, reckoning);
 
-  // Without wheels nothing bounds the velocity.
+  // Without wheels only this bounds the velocity.
   if (!wheels_are_fresh && seconds_between(bounded_utime_, sample.utime) > kBoundPeriod_s) {
     bounded_utime_ = sample.utime;
     for (const Eigen::Vector3d& direction : {axle_.forward, axle_.left})

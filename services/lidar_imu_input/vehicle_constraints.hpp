@@ -1,4 +1,4 @@
-// What a vehicle on wheels can and cannot do, as measurements of its velocity.
+// Kinematic constraints of a vehicle on wheels, as measurements of its velocity.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,24 +21,24 @@ struct AxleFrame {
   static AxleFrame of(const CarGeometry& car);
 };
 
-/// Gives the attitude filter and the dead reckoning what the wheels measure and what they exclude:
-/// sideways and vertical motion of the rear axle, and speeds that the vehicle does not reach.
+/// Updates the attitude filter and the dead reckoning by the wheels' measurements and by the
+/// constraints: no sideways and vertical motion of the rear axle, and a bounded speed.
 class VehicleConstraints {
  public:
-  /// `car`: where the rear axle is.
+  /// `car`: position of the rear axle.
   VehicleConstraints(const ConstraintParameters& parameters, const CarGeometry& car);
 
   /// Applies the constraints at an IMU sample (frame vehicle), at most once in `period_s`.
-  /// `level_yaw_rate_rad_s`: of the heading, bias not taken out.
+  /// `level_yaw_rate_rad_s`: of the heading, including the bias.
   void apply(const model::ImuSample& sample, double level_yaw_rate_rad_s, bool wheels_are_fresh,
              AttitudeFilter& attitude, DeadReckoning& reckoning);
-  /// Applies a measured axle speed: `measured_mps` as the wheels gave it, `latest` with their scale
-  /// taken out. `then`: the motion at its stamp. `pitch_cosine`: of the vehicle, now.
+  /// Applies a measured axle speed: `measured_mps` is the wheels' raw value, `latest` is corrected
+  /// by their scale. `then`: the motion at its stamp. `pitch_cosine`: of the vehicle, now.
   void add_wheel_speed(double measured_mps, const SpeedSample& latest, const MotionState& then,
                        double pitch_cosine, AttitudeFilter& attitude,
                        DeadReckoning& reckoning) const;
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.constrained_utime_, self.bounded_utime_);
@@ -50,8 +50,8 @@ class VehicleConstraints {
 
   ConstraintParameters parameters_;
   AxleFrame axle_;
-  model::Utime constrained_utime_ = 0;  ///< When constraints were last applied.
-  model::Utime bounded_utime_ = 0;      ///< When the velocity was last bounded.
+  model::Utime constrained_utime_ = 0;  ///< Time of the last constraints.
+  model::Utime bounded_utime_ = 0;      ///< Time of the last bound of the velocity.
 };
 
 }  // namespace understory::lidar_imu_input

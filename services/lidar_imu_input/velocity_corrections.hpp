@@ -1,4 +1,4 @@
-// VELOCITY_CORRECTION messages until they take effect.
+// VELOCITY_CORRECTION messages that wait to be applied.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace understory::lidar_imu_input {
 
-/// A correction stamped t takes effect at the first IMU sample not before t + delay, live and in
+/// A correction stamped t is applied at the first IMU sample not before t + delay, live and in
 /// replay alike, so that both give the same output.
 class VelocityCorrections {
  public:
@@ -17,22 +17,23 @@ class VelocityCorrections {
   explicit VelocityCorrections(double delay_s)
       : delay_us_(static_cast<model::Utime>(delay_s * 1e6)) {}
 
-  /// `latest`: stamp of the latest IMU sample. False: the correction came too late to take effect
-  /// in time; it does so at the next sample.
+  /// `latest`: stamp of the latest IMU sample. False: the correction is late and is applied at the
+  /// next sample.
   bool add(const model::VelocityCorrection& correction, std::optional<model::Utime> latest);
-  /// The next one that is due at `now`, in order of arrival; none where there is none.
+  /// The next one that is due at `now`, in order of arrival; none if none is due.
   std::optional<model::VelocityCorrection> take_due(model::Utime now);
 
-  /// A correction was applied at `now`: from that sample on the velocity is another one by so much
-  /// [m/s, frame `odom`].
+  /// A correction was applied at `now`: it changed the velocity by `odom_change_mps` [m/s, frame
+  /// `odom`].
   void set_applied(model::Utime now, const Eigen::Vector2d& odom_change_mps);
-  /// What corrections have changed since a time, which the velocity of then does not have. One
-  /// that comes late corrects what is left: of many in one burst each has the same error.
+  /// Sum of the corrections applied after `utime`, which the velocity of that time does not
+  /// contain. A late correction changes only the remaining error: all corrections of one burst
+  /// contain the same error.
   Eigen::Vector2d change_since(model::Utime utime) const;
-  /// When one was last applied; 0 = never.
+  /// Time of the last applied one; 0 = none.
   model::Utime applied_utime() const { return applied_utime_; }
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.waiting_, self.applied_utime_, self.changes_);

@@ -36,7 +36,7 @@ std::optional<ReferenceVelocity> VelocityReference::add(const model::GnssFix& fi
   previous_ = fix;
   if (!velocity) return std::nullopt;
 
-  // Below some speed the course shows no heading.
+  // Below some speed the course gives no heading.
   const auto& [east_north, sigma] = *velocity;
   const double speed = east_north.norm();
   const bool fast = speed > std::max(kFastEnough_mps, 4.0 * sigma);

@@ -1,4 +1,4 @@
-// Velocity from GNSS in the frame `odom`, for a reference.
+// Velocity from GNSS in the frame `odom`, as a reference.
 #pragma once
 
 #include <optional>
@@ -7,7 +7,7 @@
 
 namespace understory::lidar_imu_input {
 
-/// What a fix measures of the vehicle, if that drives in the direction of its heading.
+/// Measurements of a fix, for a vehicle that drives in the direction of its heading.
 struct ReferenceVelocity {
   Eigen::Vector2d odom_velocity_mps = Eigen::Vector2d::Zero();
   double sigma_mps = 0.0;
@@ -15,15 +15,15 @@ struct ReferenceVelocity {
   double heading_sigma_rad = 0.0;
 };
 
-/// Learns the rotation between east/north and `odom` from fixes of a moving vehicle.
+/// Estimates the rotation between east/north and `odom` from fixes of a moving vehicle.
 class VelocityReference {
  public:
   /// `heading_rad`: of the vehicle in odom at the fix. None before the first velocity that is fast
-  /// enough to show the rotation between east/north and odom. Fixes without velocity are
-  /// differenced, where they are at most 3 s apart.
+  /// enough to determine the rotation between east/north and odom. Fixes without velocity are
+  /// differenced if they are at most 3 s apart.
   std::optional<ReferenceVelocity> add(const model::GnssFix& fix, double heading_rad);
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.previous_, self.east_to_odom_rad_, self.east_to_odom_variance_);
@@ -31,7 +31,7 @@ class VelocityReference {
 
  private:
   std::optional<model::GnssFix> previous_;
-  std::optional<double> east_to_odom_rad_;  ///< Grows more certain with every fix.
+  std::optional<double> east_to_odom_rad_;  ///< Its uncertainty decreases with every fix.
   double east_to_odom_variance_ = 0.0;      ///< [rad^2]
 };
 

@@ -25,7 +25,7 @@ geometry::SE2WithCovariance WheelOdometry::step(const model::WheelSample& sample
   const double speed = axle_speed(car, sample.speed_mps, sample.steering_rad);
   const double curvature_per_m = std::tan(sample.steering_rad) / car.wheelbase_m;
 
-  // Errors that last for a time tau and act for seconds << tau have the power tau * seconds.
+  // Errors with a correlation time tau, acting for seconds << tau, have the power tau * seconds.
   const double power = seconds * noise.correlation_time_s;
   const double slope = (1.0 + square(std::tan(sample.steering_rad))) / car.wheelbase_m;
   const double steering_variance =
@@ -47,7 +47,7 @@ geometry::SE2WithCovariance WheelOdometry::step(const model::WheelSample& sample
 
 std::optional<geometry::SE2WithCovariance> WheelOdometry::integrate(model::Utime from,
                                                                     model::Utime to) {
-  // The sample in force at `from` is the last one that is not later.
+  // The valid sample at `from` is the last one that is not later.
   while (samples_.size() > 1 && samples_[1].utime <= from) samples_.pop_front();
   if (samples_.empty() || samples_.front().utime > from) return std::nullopt;
 
@@ -60,7 +60,7 @@ std::optional<geometry::SE2WithCovariance> WheelOdometry::integrate(model::Utime
     motion = compound(motion, step(samples_[i], seconds_between(at, until)));
     at = until;
   }
-  // Each end of the interval is off by the stamps' jitter.
+  // Each end of the interval has the stamps' jitter.
   const Eigen::Vector3d rate = motion.mean.Log() / seconds_between(from, to);
   motion.covariance += 2.0 * square(parameters_.noise.stamp_sigma_s) * rate * rate.transpose();
   return motion;

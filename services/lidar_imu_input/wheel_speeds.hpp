@@ -9,7 +9,7 @@
 
 namespace understory::lidar_imu_input {
 
-/// Speed of the axle's middle along the vehicle's x axis.
+/// Speed of the rear axle's middle along the vehicle's x axis.
 struct SpeedSample {
   model::Utime utime = 0;
   double speed_mps = 0.0;
@@ -22,7 +22,7 @@ struct SpeedSample {
   }
 };
 
-/// How much the wheels read too much, as IMU and wheels together show it.
+/// Scale error of the wheels, estimated from IMU and wheels together.
 struct WheelScale {
   double measured_over_true = 1.0;
   double sigma = 0.0;
@@ -31,27 +31,27 @@ struct WheelScale {
 /// The speeds of the last 5 s, corrected by the wheels' scale. Invariant: in order of time.
 class WheelSpeeds {
  public:
-  /// `wheels`: noise, and how long a sample holds.
+  /// `wheels`: noise, and validity of a sample.
   explicit WheelSpeeds(const WheelOdometryParameters& wheels) : wheels_(wheels) {}
 
-  /// The axle's speed as the wheels measured it [m/s], corrected by the scale where that is known.
-  /// The result is never less certain than the wheels' own noise.
+  /// The axle's speed from the wheels' measurement [m/s], corrected by the scale if that is known.
+  /// Its sigma is at most that of the wheels' own noise.
   SpeedSample corrected(model::Utime utime, double measured_mps,
                         const std::optional<WheelScale>& scale) const;
-  /// Takes a corrected speed. Precondition: not before the latest one.
+  /// Adds a corrected speed. Precondition: not before the latest one.
   void add(const SpeedSample& speed);
 
-  /// Whether a sample came so lately that it still holds at `now`.
+  /// Whether the latest sample is still valid at `now`.
   bool are_fresh(model::Utime now) const;
   /// Whether samples without a gap cover the interval.
   bool cover(model::Utime from, model::Utime to) const;
-  /// Speed at `utime` [m/s], between neighbours in proportion to time; the first and the last one
-  /// hold beyond the ends. Precondition: not empty.
+  /// Speed at `utime` [m/s], interpolated linearly; constant beyond the first and the last one.
+  /// Precondition: not empty.
   double at(model::Utime utime) const;
   /// Precondition: not empty.
   const SpeedSample& latest() const { return speeds_.back(); }
 
-  /// For saving and loading: what changes while it runs.
+  /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.speeds_);
