@@ -15,7 +15,7 @@ namespace {
 
 constexpr model::Utime kSummaryPeriod_us = 10000000;
 
-/// "trunks 12 (too_few_points 3, ...), corners ..."; empty when there was no sweep.
+/// "trunks 12 (too_few_points 3, ...), corners ..."; empty without a sweep.
 std::string summary(const SweepCounters& now, const SweepCounters& before) {
   if (now.sweeps == before.sweeps) return "";
   std::string text;
@@ -64,8 +64,9 @@ class LandmarkExtractorAdapter : public bus::Adapter {
     node.subscribe<model::PlanarScan>(channels_.lidar_scan,
                                       [this](const model::PlanarScan& scan) { add_scan(scan); },
                                       {.queue_size = 200});
-    // Each sweep is judged by itself: there is no state to save but counters, which begin anew. A
-    // sweep that arrives in part before a restart is lost, and counted when its next part comes.
+    // Each sweep is processed independently: there is no state but counters, which restart with the
+    // process. A sweep received in part before a restart is lost, and counted when its next part
+    // arrives.
     node.subscribe<model::PointSweep>(channels_.lidar_sweep,
                                       [this](const model::PointSweep& part) { add_part(part); },
                                       {.queue_size = 1000, .journaled = false});
@@ -99,13 +100,13 @@ class LandmarkExtractorAdapter : public bus::Adapter {
     publish(landmarks);
   }
 
-  /// Before the landmarks: what is made of them may ask for it.
+  /// Publish before LANDMARKS: their consumers look up this cloud.
   template <class Sweep>
   void publish_place(const Sweep& sweep) {
     if (const auto scan = place_scans_->add(sweep)) place_clouds_.publish(*scan);
   }
 
-  /// Ranges first: what is made of the landmarks may ask for them.
+  /// Publish ranges before LANDMARKS: their consumers look up the ranges.
   void publish(const model::LandmarkScan& landmarks) {
     if (!stage_->view().free.empty()) view_ranges_.publish(stage_->view());
     landmarks_.publish(landmarks);
@@ -131,7 +132,7 @@ class LandmarkExtractorAdapter : public bus::Adapter {
     }
   }
 
-  /// What became of the objects since the last time, with why.
+  /// Counts of objects since the last time, with reasons.
   void log_summary() {
     const std::string all = summary(stage_->sweep_counters(), reported_);
     if (!all.empty()) node_->log(bus::Node::Level::kInfo, "landmarks", all, channels_.lidar_sweep);

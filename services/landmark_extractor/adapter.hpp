@@ -1,4 +1,4 @@
-// The landmark extractor on the bus.
+// Connects the landmark extractor to the bus.
 #pragma once
 
 #include <string>

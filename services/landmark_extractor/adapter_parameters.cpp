@@ -109,7 +109,7 @@ void describe_trunk_selection(SweepTrunkParameters& p, bus::ParameterTable& tabl
   table.add("trunk.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that measure it.");
 }
 
-/// What one plane shows of walls, too.
+/// Wall parameters that also apply to one-plane lasers.
 void describe_walls(CornerParameters& p, const std::string& name, bus::ParameterTable& table) {
   table.add(name + ".line_tolerance_m", p.line_tolerance_m, {0.001, 1.0}, "m",
             "What is so near a line is on it.");

@@ -14,7 +14,7 @@
 namespace understory::landmark_extractor {
 namespace {
 
-/// VIEW_RANGES go so far beyond the range of trunks [m].
+/// VIEW_RANGES extend this far beyond the range of trunks [m].
 constexpr double kBeyond_m = 2.0;
 
 bool well_formed(const model::PlanarScan& scan) {
@@ -25,14 +25,14 @@ bool well_formed(const model::PlanarScan& scan) {
          scan.max_range_m > 0.0;
 }
 
-/// A sweep of one ring tells its beams apart, and says in which frame they are.
+/// A sweep of one ring keeps its beams separate and states its frame.
 bool is_of_one_plane(const model::PointSweep& sweep) {
   return sweep.rings == 1 && sweep.is_deskewed && sweep.sensor_position_m.allFinite() &&
          (!sweep.attitude || (std::abs(sweep.attitude->level_Q_vehicle.norm() - 1.0) < 1e-3 &&
                               sweep.attitude->covariance_rad2.allFinite()));
 }
 
-/// From the first beam to the last one; of a sweep, from return to return.
+/// From the first beam to the last one; in a sweep, from the first return to the last.
 model::FieldOfView field_of_view(const planar::Beams& scan,
                                  const PlanarTrunkParameters& parameters) {
   model::FieldOfView view;
@@ -44,7 +44,7 @@ model::FieldOfView field_of_view(const planar::Beams& scan,
   return view;
 }
 
-/// Whether the borders let the object be one that stands alone; at most one side may be hidden.
+/// Whether the borders allow an isolated object; at most one side may be hidden.
 bool stands_alone(const planar::Segment& segment) {
   const auto seen = [](planar::Border border) { return border == planar::Border::kClear; };
   const auto hidden = [](planar::Border border) { return border == planar::Border::kOccluded; };
@@ -65,7 +65,7 @@ model::Detection to_detection(const planar::TrunkFit& fit,
   return detection;
 }
 
-/// An error of roll and pitch moves what is at height z by z (pitch, -roll).
+/// A roll and pitch error displaces a point at height z by z (pitch, -roll).
 Eigen::Matrix2d level_error(double z_m, const Eigen::Matrix2d& level_covariance_rad2) {
   Eigen::Matrix2d moved;
   moved << 0.0, z_m, -z_m, 0.0;
@@ -79,7 +79,7 @@ bool apart_from_others(const planar::Beams& scan, const std::vector<planar::Segm
          nearest_object(scan, segments, index, parameters.separation_m) > parameters.separation_m;
 }
 
-/// A single beam leaves a radius of nothing possible: thin is what is thin beyond doubt.
+/// A single beam does not exclude a radius of zero: a trunk is too thin only if that is certain.
 bool trunk_sized(const planar::TrunkFit& fit, const PlanarTrunkParameters& parameters) {
   const double sigma = std::sqrt(fit.covariance(2, 2));
   return fit.radius_m + 2.0 * sigma >= parameters.min_radius_m &&
@@ -91,7 +91,7 @@ std::optional<model::Detection> to_trunk(const planar::Beams& scan,
                                          std::size_t index, const PlanarTrunkParameters& parameters,
                                          ExtractorCounters& counters) {
   const planar::Segment& segment = segments[index];
-  // Enough of it, and nothing beside it?
+  // Enough beams, and isolated?
   if (segment.size() < static_cast<std::size_t>(std::max(1, parameters.min_points))) {
     ++counters.too_few_points;
     return std::nullopt;
@@ -133,7 +133,7 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
 
 model::LandmarkScan LandmarkExtractor::extract(const model::PointSweep& sweep) {
   if (!is_of_one_plane(sweep)) {
-    // What is malformed is counted there.
+    // sweeps_ counts malformed sweeps.
     model::LandmarkScan of_sweep = sweeps_.extract(sweep);
     view_ = sweeps_.view();
     return of_sweep;

@@ -11,20 +11,20 @@
 
 namespace understory::landmark_extractor {
 
-/// What became of the objects in planar scans since the start, for HEALTH.
+/// Counts of the objects in planar scans since the start, for HEALTH.
 struct ExtractorCounters {
   std::uint64_t scans = 0;
   std::uint64_t scans_malformed = 0;  ///< No beams, or impossible angles.
   std::uint64_t objects = 0;          ///< Segments of scans.
-  std::uint64_t too_few_points = 0;   ///< Less than `min_points` beams.
-  std::uint64_t not_alone = 0;        ///< Something beside it at about the same distance.
-  std::uint64_t out_of_range = 0;     ///< Nearer or farther than landmarks are reported.
+  std::uint64_t too_few_points = 0;   ///< Fewer than `min_points` beams.
+  std::uint64_t not_alone = 0;        ///< Another object beside it at about the same distance.
+  std::uint64_t out_of_range = 0;     ///< Outside the range limits of landmarks.
   std::uint64_t not_round = 0;        ///< No circle fits, or one of the wrong size.
   std::uint64_t landmarks = 0;        ///< Trunks.
 };
 
-/// The stage, for both kinds of laser. It has no state: each sweep is judged by itself, and
-/// counters begin anew after a restart.
+/// The stage, for both kinds of laser. It has no state: each sweep is processed independently, and
+/// counters restart with the process.
 class LandmarkExtractor {
  public:
   /// Parameters of both kinds.
@@ -33,24 +33,24 @@ class LandmarkExtractor {
         corners_(parameters.planar, parameters.planar_corner),
         sweeps_(parameters) {}
 
-  /// Landmarks of a one-plane laser, in frame vehicle. Trunks: objects that stand alone, are round,
-  /// and have a trunk's size, in order of bearing. Then corners. A malformed scan gives none.
+  /// Landmarks of a one-plane laser, in frame vehicle. Trunks: isolated round objects of a trunk's
+  /// size, in order of bearing. Then corners. A malformed scan gives none.
   model::LandmarkScan extract(const model::PlanarScan& scan);
-  /// The same of a laser that scans in space, see SweepExtractor, or of a de-skewed scan in one
-  /// plane (one ring), in `vehicle_level`.
+  /// Likewise of a 3-D laser, see SweepExtractor, or of a de-skewed scan in one plane (one ring),
+  /// in `vehicle_level`.
   model::LandmarkScan extract(const model::PointSweep& sweep);
-  /// How far one can see at the height of trunks (of one plane: in it): of the last sweep or scan
-  /// that was extracted; no bins where that was malformed.
+  /// Range of view at the height of trunks (of one plane: in it), of the last sweep or scan; no
+  /// bins if it was malformed.
   const model::ViewRanges& view() const { return view_; }
-  /// Of planar scans.
+  /// Counts of planar scans.
   const ExtractorCounters& counters() const { return counters_; }
   /// Walls and corners of planar scans.
   const corners::CornerCounters& planar_corner_counters() const { return corners_.counters(); }
-  /// Of sweeps in space.
+  /// Counts of 3-D sweeps.
   const SweepCounters& sweep_counters() const { return sweeps_.counters(); }
 
  private:
-  /// What is known of a plane's attitude and of heights.
+  /// Uncertainty of a plane's attitude and of heights.
   struct PlaneLevel {
     double landmark_z_m = 0.0;
     Eigen::Matrix2d covariance_rad2 = Eigen::Matrix2d::Zero();  ///< Of (roll, pitch).

@@ -1,4 +1,4 @@
-// The width in which loops over many numbers are cut.
+// Number of elements processed together by vectorised loops.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@ namespace understory::landmark_extractor {
 /// Single-precision numbers that one vector register holds.
 inline constexpr std::size_t kLanes = 8;
 
-/// The next whole number of registers.
+/// Rounds up to a whole number of registers.
 constexpr std::size_t padded_to_lanes(std::size_t count) {
   return (count + kLanes - 1) / kLanes * kLanes;
 }

@@ -1,4 +1,4 @@
-// The landmark extractor as a process. Its channels: LandmarkExtractorChannels in adapter.hpp, and
+// The landmark extractor's process. Its channels: LandmarkExtractorChannels in adapter.hpp, and
 // --help.
 #include "services/landmark_extractor/adapter.hpp"
 

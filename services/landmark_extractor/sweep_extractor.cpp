@@ -8,10 +8,10 @@ namespace {
 
 /// More beams than any sensor has.
 constexpr std::uint16_t kMaxRings = 1024;
-/// What is behind a landmark is looked at this far beyond the range of landmarks [m].
+/// Margin beyond the range of landmarks, to see what is behind them [m].
 constexpr double kMargin_m = 2.0;
 
-/// Walls at least this long swallow trunks so near their plane and so near their ends [m].
+/// Least length of a wall that removes trunks, and their distance from its plane and its ends [m].
 constexpr double kWall_m = 1.5;
 constexpr double kOnWall_m = 0.25;
 constexpr double kWallEnd_m = 0.5;
@@ -24,14 +24,14 @@ bool well_formed(const model::PointSweep& sweep) {
   return std::abs(norm - 1.0) < 1e-3 && sweep.attitude->covariance_rad2.allFinite();
 }
 
-/// Covariance of (roll, pitch) [rad^2]: the sweep's own, or the default where it has no attitude.
+/// Covariance of (roll, pitch) [rad^2]: the sweep's own, or the default without an attitude.
 Eigen::Matrix2d level_covariance_of(const model::PointSweep& sweep,
                                     const SweepParameters& parameters) {
   if (sweep.attitude) return sweep.attitude->covariance_rad2;
   return parameters.level_sigma_rad * parameters.level_sigma_rad * Eigen::Matrix2d::Identity();
 }
 
-/// The part of a wall between two windows or two cars looks like a trunk.
+/// The part of a wall between two windows or two cars resembles a trunk.
 bool is_on(const corners::WallLine& wall, const model::Detection& trunk) {
   const Eigen::Vector2d offset = trunk.position_m.head<2>() - wall.centroid_m;
   const double along = wall.direction.dot(offset);

@@ -1,4 +1,4 @@
-// Finds the landmarks in one sweep of a laser that scans in space.
+// Finds the landmarks in one sweep of a 3-D laser.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace understory::landmark_extractor {
 
-/// What came in and what became of it since the start, for HEALTH.
+/// Counts of inputs and results since the start, for HEALTH.
 struct SweepCounters {
   std::uint64_t sweeps = 0;
   std::uint64_t malformed = 0;         ///< No rings, not de-skewed, frames that are not finite.
@@ -26,12 +26,12 @@ struct SweepCounters {
   corners::CornerCounters corners;
 };
 
-/// Points -> ground -> rings -> runs -> trunks and corners. Keeps its working memory from sweep to
-/// sweep, but no state: each sweep is judged by itself, so nothing is saved over a restart but
-/// counters, which begin anew. Cost: 5 ms for 64 x 2048 points.
+/// Points -> ground -> rings -> runs -> trunks and corners. Reuses its working memory between
+/// sweeps, but has no state: each sweep is processed independently, so a restart loses only the
+/// counters. Cost: 5 ms for 64 x 2048 points.
 class SweepExtractor {
  public:
-  /// Parameters of trunks, corners, and what both need.
+  /// Parameters of trunks, of corners, and of both.
   explicit SweepExtractor(const LandmarkExtractorParameters& parameters)
       : sweep_(parameters.sweep),
         trunks_(parameters.sweep, parameters.trunk),
@@ -40,13 +40,13 @@ class SweepExtractor {
   /// Landmarks of a de-skewed sweep (frame vehicle), in `vehicle_level`. A malformed sweep gives
   /// none and is counted. Trunks come first, each kind in order of bearing.
   model::LandmarkScan extract(const model::PointSweep& sweep);
-  /// How far the last sweep saw; no bins where it was malformed.
+  /// Range of view of the last sweep; no bins if it was malformed.
   const model::ViewRanges& view() const { return view_; }
   const SweepCounters& counters() const { return counters_; }  ///< Since the start.
 
  private:
   void find_runs_of_all_rings();
-  /// Leaves out trunks on walls.
+  /// Removes trunks on walls.
   void leave_out_walls(std::vector<model::Detection>& detections);
 
   SweepParameters sweep_;

@@ -10,13 +10,13 @@
 namespace understory::landmark_extractor::corners {
 namespace {
 
-/// Away from `place` into the wall.
+/// Direction from `place` into the wall.
 Eigen::Vector2d along(const WallLine& wall, const Eigen::Vector2d& place) {
   const double at = wall.direction.dot(place - wall.centroid_m);
   return at < 0.5 * (wall.from_m + wall.to_m) ? wall.direction : Eigen::Vector2d(-wall.direction);
 }
 
-/// Walls of one plane have one height.
+/// Walls from a one-plane laser have one height.
 bool at_same_heights(const WallLine& a, const WallLine& b, const CornerParameters& parameters) {
   if (a.rings == 1 && b.rings == 1) return true;
   const double overlap = std::min(a.high_z_m, b.high_z_m) - std::max(a.low_z_m, b.low_z_m);
@@ -35,7 +35,7 @@ std::optional<Meeting> meet(const WallLine& a, const WallLine& b, const Eigen::V
   meeting.reach_b_m = cross(between, a.direction) / sine;
   meeting.place_m = a.centroid_m + meeting.reach_a_m * a.direction;
 
-  // At the ends of both?
+  // Is the intersection at the ends of both walls?
   const double gap =
       parameters.max_gap_m + parameters.max_gap_per_range * (meeting.place_m - sensor).norm();
   const auto at_end = [&](const WallLine& wall, double reach) {
@@ -53,7 +53,7 @@ double skew_rad(const Meeting& meeting) {
   return std::abs(std::asin(std::clamp(meeting.along_a.dot(meeting.along_b), -1.0, 1.0)));
 }
 
-/// Both faces are measured from in front of the corner or from within it.
+/// Both faces are visible only from in front of the corner or from inside it.
 std::optional<Side> side_of(const Meeting& meeting, const Eigen::Vector2d& sensor) {
   const Eigen::Vector2d to_sensor = sensor - meeting.place_m;
   const bool inside_a = meeting.along_a.dot(to_sensor) > 0.0;
@@ -68,7 +68,8 @@ model::Detection corner_at(const Meeting& meeting, const WallLine& a, const Wall
   corner.kind = model::LandmarkKind::kCorner;
   corner.position_m.head<2>() = meeting.place_m;
 
-  // Each wall fixes the place across itself; unevenness counts at the corner, not at the centroid.
+  // Each wall determines the position across itself; unevenness acts at the corner, not at the
+  // centroid.
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   const auto add = [&](const WallLine& wall, double reach) {
     const double variance = square(wall.offset_sigma_m) + square(reach * wall.direction_sigma_rad);
@@ -85,13 +86,13 @@ model::Detection corner_at(const Meeting& meeting, const WallLine& a, const Wall
   return corner;
 }
 
-/// An error of roll and pitch moves each wall by its own height, and the corner with them; its
-/// height goes with the ground.
+/// A roll and pitch error displaces each wall in proportion to its own height, and the corner with
+/// them; the corner's height follows the ground.
 Eigen::Matrix3d from_level_error(const Eigen::Vector3d& position_m, const WallLine& a,
                                  const WallLine& b, const Eigen::Matrix2d& level_covariance_rad2) {
   Eigen::Matrix2d normals;
   normals << a.normal().transpose(), b.normal().transpose();
-  // In the plan (roll, pitch) moves what is at height z by z (pitch, -roll).
+  // In the plan (roll, pitch) displaces a point at height z by z (pitch, -roll).
   const auto across = [](const WallLine& wall) {
     return Eigen::RowVector2d(wall.z_m * -wall.normal().y(), wall.z_m * wall.normal().x());
   };

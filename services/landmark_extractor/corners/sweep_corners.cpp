@@ -11,9 +11,9 @@ namespace {
 
 /// The height of a wall is checked this far from its corner [m].
 constexpr double kAside_m = 0.4;
-/// Rings this much above its highest return should have met it, were it higher [m].
+/// A ring this much above a wall's highest return should have hit a higher wall [m].
 constexpr double kAbove_m = 0.02;
-/// So many beams on either side do not all drop out.
+/// This number of beams on either side cannot all be drop-outs.
 constexpr float kBeamsAside = 2.5F;
 
 /// Whether the ring's beams about an azimuth go beyond the range, or have no return.
@@ -57,7 +57,7 @@ std::optional<model::Detection> SweepCorners::judge(const rings::RingCloud& clou
   const auto meeting = meet(a, b, sensor, corner_);
   if (!meeting || (meeting->place_m - sensor).norm() > sweep_.max_range_m) return std::nullopt;
 
-  // At a right angle?
+  // Is it a right angle?
   ++counters_.pairs;
   if (skew_rad(*meeting) > corner_.max_skew_rad) {
     ++counters_.skew;
@@ -70,7 +70,7 @@ std::optional<model::Detection> SweepCorners::judge(const rings::RingCloud& clou
     return std::nullopt;
   }
 
-  // A house is taller than a person.
+  // Is it taller than a person?
   const ground::GroundHeight below = ground.below(meeting->place_m);
   if (!is_tall(cloud, a, meeting->place_m, meeting->along_a, below.height_m) ||
       !is_tall(cloud, b, meeting->place_m, meeting->along_b, below.height_m)) {

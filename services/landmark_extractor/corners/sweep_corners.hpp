@@ -1,4 +1,4 @@
-// Corners of houses: where two upright walls meet at about a right angle.
+// Corners of houses: intersections of two upright walls at about a right angle.
 #pragma once
 
 #include <cstdint>
@@ -12,20 +12,20 @@
 
 namespace understory::landmark_extractor::corners {
 
-/// What became of walls and their pairs since the start.
+/// Counts of walls and their pairs since the start.
 struct CornerCounters {
   std::uint64_t walls = 0;    ///< Found.
-  std::uint64_t pairs = 0;    ///< Walls that meet.
-  std::uint64_t skew = 0;     ///< At no right angle.
+  std::uint64_t pairs = 0;    ///< Pairs of walls that meet.
+  std::uint64_t skew = 0;     ///< Not at a right angle.
   std::uint64_t low = 0;      ///< Ends below a person's height: a car, a hedge, a box.
-  std::uint64_t hidden = 0;   ///< From the sensor's place these two faces cannot both be seen.
-  std::uint64_t corners = 0;  ///< Given out.
+  std::uint64_t hidden = 0;   ///< These two faces are not visible together from the sensor.
+  std::uint64_t corners = 0;  ///< Published.
 };
 
-/// Finds the edges of houses in one sweep. Keeps its memory from sweep to sweep, but no state.
+/// Finds the corners of houses in one sweep. Reuses memory between sweeps, but has no state.
 class SweepCorners {
  public:
-  /// `sweep`: what is common with trunks.
+  /// `sweep`: parameters common with trunks.
   SweepCorners(const SweepParameters& sweep, const CornerParameters& corner)
       : sweep_(sweep), corner_(corner), walls_(sweep, corner) {}
 
@@ -39,7 +39,7 @@ class SweepCorners {
   const std::vector<WallLine>& walls() const { return found_; }
 
  private:
-  /// The corner of two walls, or none and a count why.
+  /// The corner of two walls; else none, and the reason is counted.
   std::optional<model::Detection> judge(const rings::RingCloud& cloud, const WallLine& a,
                                         const WallLine& b, const ground::GroundSurface& ground,
                                         const Eigen::Matrix2d& level_covariance_rad2);

@@ -12,18 +12,18 @@
 namespace understory::landmark_extractor::corners {
 namespace {
 
-/// Segments of one wall have directions that differ by less than this [rad]...
+/// Directions of segments of one wall differ by less than this [rad]...
 constexpr double kSameDirection = 0.1;
-/// ... and are found this many rings apart at most: windows and shutters interrupt a wall.
+/// ... and they are at most this many rings apart: windows and shutters interrupt a wall.
 constexpr std::size_t kRingReach = 4;
 
-/// A wall's unevenness is measured over so many stretches of it.
+/// Number of stretches over which a wall's unevenness is measured.
 constexpr std::size_t kStretches = 8;
-/// Points scatter across a wall at least by this part of their range's noise.
+/// Least scatter of points across a wall, relative to their range noise.
 constexpr double kLeastAcross = 0.1;
-/// Of one ring the stated noise counts as that of so many points.
+/// Weight of the stated noise with a single ring, in points.
 constexpr double kStatedPoints = 6.0;
-/// So many neighbours on a segment are summed.
+/// Number of neighbours on a segment that are summed.
 constexpr std::size_t kPartPoints = 8;
 
 }  // namespace
@@ -56,7 +56,7 @@ const std::vector<WallLine>& WallFinder::find(const WallPoints& all,
     }
     ring_begins_[run.ring + std::size_t{1}] = segments_.size();
   }
-  // Rings without a segment.
+  // Skips rings without a segment.
   for (std::size_t ring = 0; ring < all.rings; ++ring) {
     ring_begins_[ring + 1] = std::max(ring_begins_[ring], ring_begins_[ring + 1]);
   }
@@ -64,7 +64,7 @@ const std::vector<WallLine>& WallFinder::find(const WallPoints& all,
   return walls_;
 }
 
-/// Douglas and Peucker: cuts at the point that is farthest from the chord.
+/// Douglas and Peucker: cuts at the point farthest from the chord.
 void WallFinder::split(const WallPoints& all, const rings::Run& run, std::size_t first,
                        std::size_t last) {
   if (last - first + 1 < rings::kLeastOfWall) return;
@@ -107,7 +107,7 @@ void WallFinder::add_segment(const WallPoints& all, const rings::Run& run, std::
 
   // Sums of its inner points.
   double z = 0.0;
-  // The points where segments meet belong to neither for sure.
+  // The end points, where segments meet, are ambiguous.
   segment.first_part = static_cast<std::uint32_t>(parts_.size());
   for (std::size_t i = first + 1; i < last; ++i) {
     if ((i - first - 1) % kPartPoints == 0) parts_.emplace_back();
@@ -138,9 +138,10 @@ bool WallFinder::same_wall(const LineSegment& a, const LineSegment& b) const {
   const double along = direction.dot(middle);
   const double lever = std::max(length, 2.0 * half);
   const double across = std::abs(cross(direction, middle));
-  // Segments of one ring lie beside each other, cut by noise or by a thing before the wall.
+  // Segments of one ring lie beside each other, separated by noise or by an object in front of the
+  // wall.
   const double gap = is_one_ring_ ? corner_.max_gap_m : 0.0;
-  // The directions of two short segments are uncertain, but not their neighbourhood.
+  // The directions of two short segments are uncertain, but not their proximity.
   return across < corner_.line_tolerance_m * (1.0 + std::abs(along - 0.5 * length) / lever) &&
          along + half > -gap && along - half < length + gap;
 }
@@ -174,8 +175,8 @@ void WallFinder::join() {
   }
 }
 
-/// RMS distance of stretches of the wall from its line beyond what the noise of their points
-/// explains: neighbouring rings measure the same bumps.
+/// RMS distance of stretches of the wall from its line beyond their points' noise: neighbouring
+/// rings measure the same bumps.
 double WallFinder::unevenness(const std::vector<std::uint32_t>& members, const WallLine& wall,
                               double variance_m2) const {
   std::array<double, kStretches> counts{};
@@ -200,12 +201,12 @@ double WallFinder::unevenness(const std::vector<std::uint32_t>& members, const W
     excess += square(offsets[k] / counts[k]) - variance_m2 / counts[k];
     stretches += 1.0;
   }
-  // The line took two of them.
+  // The line uses two degrees of freedom.
   return stretches > 3.0 ? std::sqrt(std::max(0.0, excess / (stretches - 2.0))) : 0.0;
 }
 
-/// The few points of one ring may lie on their line by chance: the noise stated for a beam counts
-/// beside their scatter.
+/// The few points of one ring may lie on their line by chance: the stated noise of a beam is
+/// combined with their scatter.
 double WallFinder::variance_across(const LineSums& sums, const WallLine& wall,
                                    double axis2_m2) const {
   if (wall.rings > 1) return std::max(axis2_m2, square(kLeastAcross * sweep_.range_sigma_m));
@@ -252,7 +253,7 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   }
   if (wall.length() < corner_.min_length_m) return;
 
-  // Noise averages out over points; unevenness, over stretches of the wall.
+  // Noise averages out over points, unevenness over stretches of the wall.
   wall.unevenness_m = std::hypot(unevenness(members, wall, across2), corner_.flatness_sigma_m);
   const double of_offset = across2 / sums.count + square(wall.unevenness_m) / kStretches;
   wall.offset_sigma_m = std::sqrt(of_offset);

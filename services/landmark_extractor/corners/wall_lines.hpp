@@ -1,4 +1,4 @@
-// Upright walls: straight parts of several rings, one above the other.
+// Upright walls: straight segments of several rings, one above the other.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,12 +11,12 @@
 
 namespace understory::landmark_extractor::corners {
 
-/// Area that two vectors of the plan span, positive where b lies to the left of a.
+/// Area spanned by two vectors of the plan, positive if b lies to the left of a.
 inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-/// Sums over points of the plan, relative to an anchor, from which a line follows.
+/// Sums over points of the plan, relative to an anchor, for fitting a line.
 struct LineSums {
   double count = 0.0;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();  ///< [m]
@@ -28,34 +28,36 @@ struct LineSums {
   LineSums& operator+=(const LineSums& other);
 };
 
-/// A straight part of one ring, frame `vehicle_level`.
+/// A straight segment of one ring, frame `vehicle_level`.
 struct LineSegment {
   Eigen::Vector2d from_m = Eigen::Vector2d::Zero();  ///< Right end as seen from the sensor.
   Eigen::Vector2d to_m = Eigen::Vector2d::Zero();    ///< Left end.
   LineSums sums;
-  std::uint32_t first_part = 0;  ///< Its parts (some neighbours each), among those of the sweep.
+  std::uint32_t first_part =
+      0;  ///< Index of its first part (some neighbours each) among those of the sweep.
   std::uint32_t parts = 0;
   std::uint16_t ring = 0;
   double z_m = 0.0;         ///< Mean.
-  std::uint32_t first = 0;  ///< Points of the cloud at either end.
+  std::uint32_t first = 0;  ///< Indices of its end points in the cloud.
   std::uint32_t last = 0;
   Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  ///< Unit, from end to end.
   double length_m = 0.0;
 };
 
-/// A vertical plane, as far as it is measured; frame `vehicle_level`.
+/// The measured extent of a vertical plane; frame `vehicle_level`.
 struct WallLine {
   Eigen::Vector2d centroid_m = Eigen::Vector2d::Zero();
-  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  ///< Unit; to the left for the sensor.
+  Eigen::Vector2d direction =
+      Eigen::Vector2d::UnitX();      ///< Unit; to the left as seen from the sensor.
   double from_m = 0.0;               ///< Extent along `direction`, from the centroid.
-  double to_m = 0.0;                 ///< The same of the other end.
+  double to_m = 0.0;                 ///< Other end of the extent.
   double z_m = 0.0;                  ///< Mean of its points.
   double unevenness_m = 0.0;         ///< RMS deviation from a plane beyond the points' noise.
-  double offset_sigma_m = 0.0;       ///< Of the centroid, across.
+  double offset_sigma_m = 0.0;       ///< Of the centroid, across the wall.
   double direction_sigma_rad = 0.0;  ///< Of `direction`.
   double low_z_m = 0.0;              ///< Of the lowest ring.
   double high_z_m = 0.0;             ///< Of the highest ring.
-  int rings = 0;                     ///< That measured it.
+  int rings = 0;                     ///< Number of rings that measured it.
 
   /// Extent along `direction` [m].
   double length() const { return to_m - from_m; }
@@ -63,16 +65,16 @@ struct WallLine {
   Eigen::Vector2d normal() const { return {-direction.y(), direction.x()}; }
 };
 
-/// The points that runs are of, and where the sensor was at utime; frame `vehicle_level`.
+/// The points of the runs, and the sensor's position at utime; frame `vehicle_level`.
 struct WallPoints {
   std::span<const points::RingPoint> points;
   std::size_t rings = 0;
   Eigen::Vector2d sensor_m = Eigen::Vector2d::Zero();
 };
 
-/// Cuts runs into straight segments (Douglas and Peucker), joins those of neighbouring rings in one
-/// upright plane (of a laser with one ring: those in one line), and fits a line to each group.
-/// Keeps its memory from sweep to sweep, but no state.
+/// Cuts runs into straight segments (Douglas and Peucker), joins segments of neighbouring rings in
+/// one upright plane (for a laser with one ring: in one line), and fits a line to each group.
+/// Reuses memory between sweeps, but has no state.
 class WallFinder {
  public:
   /// Noise and limits are taken from the parameters.
@@ -88,7 +90,8 @@ class WallFinder {
                    std::size_t last);
   void join();
   bool same_wall(const LineSegment& a, const LineSegment& b) const;
-  /// Across, of each point [m^2]; `axis2_m2` is their mean square deviation from the line.
+  /// Variance across the wall, of each point [m^2]; `axis2_m2` is their mean square deviation from
+  /// the line.
   double variance_across(const LineSums& sums, const WallLine& wall, double axis2_m2) const;
   std::uint32_t root(std::uint32_t segment);
   void add_wall(const std::vector<std::uint32_t>& members);

@@ -9,7 +9,7 @@
 namespace understory::landmark_extractor::ground {
 namespace {
 
-/// Whole registers: behind the band are zeros, which change nothing.
+/// Whole registers: the zeros behind the band have no effect.
 [[gnu::always_inline]] inline void finish_column(float* column, std::size_t band) {
   const float scale = 1.0F / std::sqrt(std::max(column[0], 1e-9F));
   for (std::size_t k = 0; k < padded_to_lanes(band); ++k) column[k] *= scale;
@@ -54,7 +54,7 @@ namespace {
   for (std::size_t j = layout.size; j-- > 0;) {
     const float* column = matrix + j * layout.stride;
     const float* after = right + j + 1;
-    // Several sums side by side: one would wait for itself.
+    // Several sums side by side: a single one would stall on its own latency.
     std::array<float, kLanes> sums{};
     for (std::size_t k = 0; k < rest; k += kLanes) {
       for (std::size_t l = 0; l < kLanes; ++l) sums[l] += column[k + l + 1] * after[k + l];

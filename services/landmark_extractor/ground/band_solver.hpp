@@ -1,4 +1,4 @@
-// Linear systems whose matrix is symmetric, positive and zero far from its diagonal.
+// Linear systems with a symmetric positive definite band matrix.
 #pragma once
 
 #include <cstddef>
@@ -18,9 +18,9 @@ struct BandLayout {
   static BandLayout of(std::size_t size, std::size_t band) {
     return {size, band, padded_to_lanes(band) + kLanes};
   }
-  /// Values of the whole matrix.
+  /// Number of values of the whole matrix.
   std::size_t entries() const { return size * stride; }
-  /// Values of a right-hand side, with zeros behind it.
+  /// Number of values of a right-hand side, with zeros behind it.
   std::size_t padded_size() const { return size + stride; }
 
  private:

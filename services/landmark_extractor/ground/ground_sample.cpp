@@ -7,7 +7,7 @@
 namespace understory::landmark_extractor::ground {
 namespace {
 
-/// So many points are enough for the ground.
+/// Number of points that is sufficient for the ground.
 constexpr std::size_t kEnough = 20000;
 
 }  // namespace
@@ -16,7 +16,7 @@ void GroundSample::take(const model::PointSweep& sweep, const points::Levelling&
   grid_ = points::GroundGrid::around(levelling.sensor_m.x(), levelling.sensor_m.y(),
                                      levelling.max_range_m);
 
-  // A column at least, so that no beam is always left out.
+  // At least one column, so that no beam is always omitted.
   const std::size_t column = std::max<std::size_t>(sweep.rings, 1);
   const std::size_t stride = std::max<std::size_t>(1, sweep.points.size() / kEnough);
   const std::size_t length = stride == 1 ? points::PointBlock::kSize : column;
@@ -49,7 +49,7 @@ void GroundSample::reserve(std::size_t size) {
   cell_.resize(x_.size());
 }
 
-/// A whole number of registers.
+/// Pads to a whole number of registers.
 void GroundSample::pad(std::size_t size) {
   size_ = (size + kLanes - 1) / kLanes * kLanes;
   for (std::size_t i = size; i < size_; ++i) {

@@ -1,4 +1,4 @@
-// Returns from which the ground is found: enough of a sweep's points, levelled.
+// A levelled sample of a sweep's points, for fitting the ground.
 #pragma once
 
 #include <cstdint>
@@ -9,23 +9,22 @@
 
 namespace understory::landmark_extractor::ground {
 
-/// Every n-th column of a sweep with many points. Keeps its memory from sweep to sweep, but no
-/// state.
+/// Every n-th column of a sweep with many points. Reuses memory between sweeps, but has no state.
 class GroundSample {
  public:
   /// Takes about 20000 points. The grid covers levelling.max_range_m around the sensor.
   void take(const model::PointSweep& sweep, const points::Levelling& levelling);
 
-  /// Of the cells below.
+  /// The grid of the cells below.
   const points::GroundGrid& grid() const { return grid_; }
-  /// Coordinates in frame `vehicle_level` [m]; their number is a whole number of registers. Points
-  /// in the cell nowhere() do not count.
+  /// Coordinates in frame `vehicle_level` [m]; padded to a whole number of registers. Points in the
+  /// cell nowhere() are not used.
   std::span<const float> x() const { return {x_.data(), size_}; }
   /// See x().
   std::span<const float> y() const { return {y_.data(), size_}; }
   /// See x().
   std::span<const float> z() const { return {z_.data(), size_}; }
-  /// Index of the grid's cell that each point is in.
+  /// Index of each point's cell in the grid.
   std::span<const std::int32_t> cell() const { return {cell_.data(), size_}; }
 
  private:

@@ -11,18 +11,18 @@
 namespace understory::landmark_extractor::ground {
 namespace {
 
-/// Weight of a second difference between nodes against one cell: ground bends by 0.3 m over a
-/// node's distance where cells lie within 0.1 m.
+/// Weight of a second difference between nodes relative to one cell: ground bends by 0.3 m over the
+/// distance of nodes, cells are accurate to 0.1 m.
 constexpr float kSmoothness = 0.1F;
-/// Keeps the matrix regular where there are no points at all.
+/// Keeps the matrix regular in regions without points.
 constexpr float kFlatness = 1e-3F;
 /// Scales [m] at which cells above the surface lose their weight, iteration by iteration.
 constexpr std::array<float, 3> kScales_m{1.0F, 0.4F, 0.2F};
-/// Returns so near the surface are ground.
+/// Returns within this distance of the surface are ground.
 constexpr float kOnGround_m = 0.25F;
-/// Roughness: how far the ground at one place is from the returns around it.
+/// Roughness: difference between the ground at a point and the returns around it.
 constexpr double kRoughness_m = 0.05;
-/// How much the surface's own height is unknown per metre from the nearest ground returns.
+/// Growth of the sigma of the surface's height per metre from the nearest ground returns.
 constexpr double kUnknownSlope = 0.12;
 
 /// A cell without returns.
@@ -36,7 +36,7 @@ struct PatchSums {
   std::array<Lanes, 4> right{};
 };
 
-/// Part of each of a patch's nodes in the surface at the middle of one of its cells.
+/// Weight of each of a patch's nodes in the surface at the centre of one of its cells.
 constexpr std::array<float, 4> share_of(int plane) {
   constexpr auto kCells = static_cast<float>(points::GroundGrid::kCellsPerSpan);
   const int column = plane % points::GroundGrid::kCellsPerSpan;
@@ -46,7 +46,7 @@ constexpr std::array<float, 4> share_of(int plane) {
   return {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
 }
 
-/// Adds the cells of one plane; those above the surface are hardly ground, those far below are
+/// Adds the cells of one plane; cells above the surface are hardly ground, cells far below are
 /// ghosts. Without a scale (0) all have the same weight.
 [[gnu::always_inline]] inline void add_plane(const float* lowest, const std::array<Lanes, 4>& nodes,
                                              const std::array<float, 4>& share, float per_scale,
@@ -57,7 +57,7 @@ constexpr std::array<float, 4> share_of(int plane) {
     const float above = z - (share[0] * nodes[0][l] + share[1] * nodes[1][l] +
                              share[2] * nodes[2][l] + share[3] * nodes[3][l]);
 
-    // A cell far from the surface counts for little.
+    // A cell far from the surface has little weight.
     const float e = above * (above > 0.0F ? per_scale : per_scale * (1.0F / 3.0F));
     const float root = 1.0F / (1.0F + e * e);
     const float w = is_there ? root * root : 0.0F;
@@ -127,7 +127,7 @@ void GroundSurface::fit(const GroundSample& sample) {
   for (std::size_t k = 0; k <= kScales_m.size(); ++k) {
     add_cells(k == 0 ? 0.0F : 1.0F / kScales_m[k - 1]);
     solve_band(layout_, matrix_.data(), nodes_.data());
-    // What the last columns left behind the end.
+    // Clears the values written beyond the end by the last columns.
     std::fill(nodes_.begin() + static_cast<std::ptrdiff_t>(layout_.size), nodes_.end(), 0.0F);
   }
 
@@ -256,7 +256,7 @@ GroundHeight GroundSurface::below(const Eigen::Vector2d& place_m) const {
   const int row = static_cast<int>(kCells * grid_.place(y, grid_.corner_y_m));
   const int side = grid_.cells_per_side();
 
-  // Ring of cells by ring of cells outwards until one has ground returns.
+  // Searches rings of cells outwards until one has ground returns.
   for (int reach = 1; reach <= 8; ++reach) {
     double sum = 0.0;
     double cells = 0.0;

@@ -1,4 +1,4 @@
-// The height of the ground around the vehicle, also where grass, trunks or distance hide it.
+// The height of the ground around the vehicle, also under grass, behind trunks and far away.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace understory::landmark_extractor::ground {
 
-/// Ground below one place.
+/// Ground below one point of the plan.
 struct GroundHeight {
   double height_m = 0.0;  ///< z in `vehicle_level`.
   double sigma_m = 0.0;   ///< Of height_m.
@@ -17,18 +17,18 @@ struct GroundHeight {
 
 /// A smooth surface (bilinear between nodes, second differences penalised) under the lowest returns
 /// of small cells. Returns above it are trunks and bushes and lose their weight step by step.
-/// Keeps its memory from sweep to sweep, but no state.
+/// Reuses memory between sweeps, but has no state.
 class GroundSurface {
  public:
   /// Fits the surface: four linear solutions with a band matrix, about 0.5 ms.
   void fit(const GroundSample& sample);
 
-  /// Of nodes and cells.
+  /// The grid of nodes and cells.
   const points::GroundGrid& grid() const { return grid_; }
   /// One per node: height [m] between it and the next ones.
   const points::GroundPatch* patches() const { return patches_.data(); }
-  /// The ground below a place of the plan, frame `vehicle_level`: the surface, moved to the ground
-  /// returns near by; sigma grows with the distance to them.
+  /// The ground below a point of the plan, frame `vehicle_level`: the surface, corrected by the
+  /// ground returns near by; sigma grows with the distance to them.
   GroundHeight below(const Eigen::Vector2d& place_m) const;
 
  private:

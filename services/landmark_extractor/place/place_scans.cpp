@@ -14,7 +14,7 @@ constexpr int kAxisBits = 20;
 /// A point in its cube.
 struct InCube {
   std::uint64_t cube = 0;
-  float off = 0.0F;  ///< Squared distance from the cube's middle, of edges of 1.
+  float off = 0.0F;  ///< Squared distance from the cube's centre, for edges of 1.
   std::uint32_t index = 0;
 
   friend bool operator<(const InCube& a, const InCube& b) {
@@ -65,7 +65,7 @@ std::vector<model::PlacePoint> down_sampled(const std::vector<Eigen::Vector3f>& 
                                [](const InCube& a, const InCube& b) { return a.cube == b.cube; });
   cubes.erase(end, cubes.end());
 
-  // Of too many, some of everywhere.
+  // Beyond the limit, a uniform selection.
   const std::size_t kept = std::min(cubes.size(), static_cast<std::size_t>(parameters.most_points));
   std::vector<model::PlacePoint> result;
   result.reserve(kept);

@@ -1,4 +1,4 @@
-// What loop detectors look at of a sweep: its cloud, levelled and down-sampled.
+// The cloud of a sweep for loop detectors, levelled and down-sampled.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,28 +12,27 @@
 
 namespace understory::landmark_extractor::place {
 
-/// Of the points within `range_m` in the plan, the one nearest to the middle of each cube with
-/// edges of `cube_m`; of more than `most`, every so many in order of cubes. Points that are not
-/// finite are left out. O(n log n).
+/// Per cube with edges of `cube_m` the point nearest to its centre, of the points within `range_m`
+/// in the plan; beyond `most` every n-th, in order of cubes. Points that are not finite are
+/// dropped. O(n log n).
 std::vector<model::PlacePoint> down_sampled(const std::vector<Eigen::Vector3f>& points,
                                             const PlaceScanParameters& parameters);
 
 /// The cloud of a de-skewed sweep in `vehicle_level`; one without attitude is taken as level.
 model::PlaceScan place_scan_of(const model::PointSweep& sweep,
                                const PlaceScanParameters& parameters);
-/// The same of a scan in one plane.
+/// Likewise of a scan in one plane.
 model::PlaceScan place_scan_of(const model::PlanarScan& scan,
                                const PlaceScanParameters& parameters);
 
-/// Which sweeps become a PLACE_SCAN. State: when the last one was made, which begins anew after a
-/// restart.
+/// Selects the sweeps that become a PLACE_SCAN. State: time of the last one; a restart clears it.
 class PlaceScans {
  public:
-  /// `parameters`: none are made where the period is 0.
+  /// `parameters`: none are made if the period is 0.
   explicit PlaceScans(const PlaceScanParameters& parameters) : parameters_(parameters) {}
 
-  /// The cloud of a sweep or scan that is due: the first one, what comes `period_s` later, and what
-  /// comes earlier than the last one did. Precondition: the extractor did not call it malformed.
+  /// The cloud of a sweep or scan that is due: the first one, one `period_s` after the last, and
+  /// one earlier than the last. Precondition: the extractor did not count it as malformed.
   template <class Sweep>
   std::optional<model::PlaceScan> add(const Sweep& sweep) {
     if (!is_due(sweep.utime)) return std::nullopt;

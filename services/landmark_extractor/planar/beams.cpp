@@ -9,10 +9,10 @@
 namespace understory::landmark_extractor::planar {
 namespace {
 
-/// The next beam gave a return: it is not farther than this many steps away.
+/// Largest distance of two neighbouring beams with returns, in steps.
 constexpr double kNextBeam = 1.5;
 
-/// Least time between two returns: that from beam to beam, if any two are neighbours [s].
+/// Least time between two returns: the interval of beams, if any two are neighbours [s].
 double beam_interval_s(const model::PointSweep& sweep) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < sweep.points.size(); ++i) {
@@ -64,8 +64,8 @@ Beam silent(double bearing_rad) {
   return beam;
 }
 
-/// Adds the last beam where it gave no return: the stamp is its time. When the first one was, a
-/// sweep does not say.
+/// Adds the last beam if it gave no return: the stamp is its time. The time of the first one is
+/// unknown in a sweep.
 void end_scan(const points::Spin& spin, double interval_s, Beams& scan) {
   if (scan.beams.empty()) return;
   const Beam& last = spin.is_leftward ? scan.beams.back() : scan.beams.front();

@@ -1,4 +1,4 @@
-// The beams of one plane, each from where the laser was when it looked.
+// The beams of one plane, each with the laser's position at its time.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@ namespace understory::landmark_extractor::planar {
 /// Sigma of a landmark's height [m]: one plane does not measure it.
 inline constexpr double kHeightSigma_m = 0.5;
 
-/// One beam in the plan. Beams of a scan go from the right to the left.
+/// One beam in the plan. Beams of a scan are ordered from right to left.
 struct Beam {
   Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();  ///< Of the laser.
   Eigen::Vector2d point_m = Eigen::Vector2d::Zero();   ///< Of the return, if there is one.
@@ -26,18 +26,18 @@ struct Beam {
   bool is_return() const { return range_m > 0.0; }
 };
 
-/// A scan. Frame `vehicle_level`, where the attitude is known, else `vehicle`.
+/// A scan. Frame `vehicle_level` if the attitude is known, else `vehicle`.
 struct Beams {
   std::vector<Beam> beams;
-  double step_rad = 0.0;                               ///< From beam to beam; 0 = not known.
+  double step_rad = 0.0;                               ///< From beam to beam; 0 = unknown.
   double max_range_m = 0.0;                            ///< Of the laser.
   Eigen::Vector3d sensor_m = Eigen::Vector3d::Zero();  ///< Of the laser at utime.
 };
 
-/// A scan that is taken at once. Precondition: its step is positive.
+/// A scan taken in one instant. Precondition: its step is positive.
 Beams beams_of(const model::PlanarScan& scan);
-/// A de-skewed sweep of one ring: where beams gave no return for a while there is one without.
-/// `spin`: how the laser moved. What is before the first return is not known.
+/// A de-skewed sweep of one ring: a gap in the returns gets a beam without return. `spin`: motion
+/// of the laser. Beams before the first return are unknown.
 Beams beams_of(const model::PointSweep& sweep, const points::Spin& spin);
 
 }  // namespace understory::landmark_extractor::planar

@@ -9,7 +9,7 @@
 namespace understory::landmark_extractor::planar {
 namespace {
 
-/// So many beams without a return in the middle of a wall are drop-outs.
+/// Up to this number of beams without return within a wall are drop-outs.
 constexpr double kDropOuts = 3.5;
 
 SweepParameters noise_of(const PlanarTrunkParameters& laser) {
@@ -40,7 +40,7 @@ points::RingPoint ring_point(const Beam& beam) {
 ScanCorners::ScanCorners(const PlanarTrunkParameters& laser, const CornerParameters& corner)
     : laser_(laser), corner_(of_one_ring(corner)), finder_(noise_of(laser), corner_) {}
 
-/// Runs of returns that are neighbours in space; unlike segments they go on over drop-outs.
+/// Runs of neighbouring returns; unlike segments they continue over drop-outs.
 void ScanCorners::take_points(const Beams& scan) {
   points_.clear();
   runs_.clear();
@@ -92,7 +92,7 @@ void ScanCorners::find(const Beams& scan, double height_m,
   counters_.corners += detections.size() - first;
 }
 
-/// The corner of two walls, or none and a count why.
+/// The corner of two walls; else none, and the reason is counted.
 std::optional<model::Detection> ScanCorners::judge(const corners::WallLine& a,
                                                    const corners::WallLine& b,
                                                    const Eigen::Vector2d& sensor) {

@@ -12,9 +12,9 @@
 
 namespace understory::landmark_extractor::planar {
 
-/// Walls and their meetings as in space, but from one ring. A plane does not show how tall a thing
-/// is: by `min_length_m` both faces must be longer than a car is wide. Keeps its memory from scan
-/// to scan, but no state.
+/// Walls and their intersections as in 3-D, but from one ring. A plane does not show an object's
+/// height: instead, with `min_length_m` both faces must be longer than the width of a car. Reuses
+/// memory between scans, but has no state.
 class ScanCorners {
  public:
   /// `laser`: noise and range. `corner.min_rings` and `corner.min_extent_m` are not used.

@@ -20,7 +20,7 @@ bool same_object(const Beams& scan, std::size_t a, std::size_t b,
   return distance(scan, a, b) <= parameters.break_distance_m + parameters.break_per_range * nearer;
 }
 
-/// What lies beyond the beam `edge` of an object, at the beam `beyond`.
+/// Border of an object beyond its beam `edge`, at the beam `beyond`.
 Border border(const Beams& scan, std::size_t edge, std::size_t beyond,
               const PlanarTrunkParameters& parameters) {
   if (!scan.beams[beyond].is_return()) return Border::kClear;
@@ -44,7 +44,7 @@ double distance(const Beams& scan, const Segment& a, const Segment& b) {
   return least;
 }
 
-/// Whether the bearing between two beams is so wide that nothing at `range` is within `radius`.
+/// Whether the bearing between two beams is so large that no point at `range` is within `radius`.
 bool too_wide(const Beams& scan, std::size_t a, std::size_t b, double range, double radius) {
   return range * std::sin(std::min(1.5, scan.beams[b].bearing_rad - scan.beams[a].bearing_rad)) >
          radius;

@@ -12,11 +12,11 @@ namespace understory::landmark_extractor::planar {
 namespace {
 
 constexpr int kIterations = 8;
-/// Beams that graze the trunk more than this (part of the radius) say little of its range.
+/// Beams that graze the trunk beyond this share of the radius measure its range poorly.
 constexpr double kMaxGraze = 0.9;
 
-/// The returns of one object as seen from one place: where the laser was in their middle. It moves
-/// by a centimetre while it passes over a trunk.
+/// The returns of one object as seen from one position: the laser's at their middle. It moves by
+/// about a centimetre while it scans a trunk.
 struct Returns {
   std::vector<double> bearings_rad;
   std::vector<double> ranges_m;
@@ -58,7 +58,7 @@ struct RangeTerm {
   double sigma = 0.0;
 };
 
-/// Where a beam at `bearing` meets the circle x = (range, bearing, radius).
+/// Intersection of a beam at `bearing` with the circle x = (range, bearing, radius).
 RangeTerm beam_on_circle(const Eigen::Vector3d& x, double bearing,
                          const PlanarTrunkParameters& parameters) {
   const double d = x[0];
@@ -72,15 +72,15 @@ RangeTerm beam_on_circle(const Eigen::Vector3d& x, double bearing,
   term.predicted = d * c - q;
   const double per_bearing = d * s - square(d) * s * c / q;
   term.jacobian = {c + d * s * s / q, per_bearing, -radius / q};
-  // A footprint of some width on a slanting surface smears the range.
+  // The width of the footprint on a slanting surface blurs the range.
   term.sigma = std::sqrt(square(parameters.range_sigma_m) + square(parameters.roundness_sigma_m) +
                          square(per_bearing * parameters.beam_width_rad));
-  // Nearer to the edge the range falls off so steeply that only the edge itself says something.
+  // Nearer to the edge the range changes so steeply that only the edge itself is informative.
   if (std::abs(sine) > limit) term.sigma = std::hypot(term.sigma, radius);
   return term;
 }
 
-/// The edge on one side (+1 left, -1 right) lies somewhere between its last beam and the next.
+/// The edge on one side (+1 left, -1 right) lies between its last beam and the next.
 void add_edge(const Eigen::Vector3d& x, double side, double last_bearing, double step,
               const PlanarTrunkParameters& parameters, Normal& normal) {
   const double seen = last_bearing + side * (0.5 * step - parameters.beam_width_rad);
@@ -117,8 +117,8 @@ Eigen::Vector3d start(const Returns& seen, const PlanarTrunkParameters& paramete
   return {nearest + radius, bearing, radius};
 }
 
-/// Against what the fit leaves uncertain, too: edges are uniform within a step, not Gaussian, and a
-/// beam near one feels that.
+/// Includes the fit's uncertainty: the error of an edge is uniform within a step, not Gaussian,
+/// which affects beams near the edge.
 double mean_square_residual(const Eigen::Vector3d& x, const Eigen::Matrix3d& covariance,
                             const Returns& seen, const PlanarTrunkParameters& parameters) {
   double sum = 0.0;

@@ -1,4 +1,4 @@
-// A circle through the returns of one object.
+// Fit of a circle to the returns of one object.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace understory::landmark_extractor::planar {
 
-/// A trunk in polar coordinates about where the laser was when it looked at it.
+/// A trunk in polar coordinates about the laser's position at that time.
 struct TrunkFit {
   Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();  ///< Of the laser, frame of the beams.
   double range_m = 0.0;                                ///< Of the centre.
@@ -26,10 +26,10 @@ struct TrunkFit {
   Eigen::Matrix2d centre_covariance() const;
 };
 
-/// Maximum a posteriori estimate of centre and radius. Evidence: the range of each beam, the
-/// bearings of those edges that are seen (`Border::kClear`), and the prior of the radius, which
-/// decides where a trunk is so far away that its width is within one beam. None when the
-/// estimate does not settle on a circle before the sensor.
+/// Maximum a posteriori estimate of centre and radius. Measurements: the range of each beam, the
+/// bearings of visible edges (`Border::kClear`), and the prior of the radius, which dominates for a
+/// distant trunk narrower than a beam. None if the iteration does not converge to a circle in front
+/// of the sensor.
 std::optional<TrunkFit> fit_trunk(const Beams& scan, const Segment& segment,
                                   const PlanarTrunkParameters& parameters);
 

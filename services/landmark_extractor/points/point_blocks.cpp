@@ -25,7 +25,7 @@ typedef float Four __attribute__((vector_size(16)));
   std::memcpy(to, &value, sizeof(value));
 }
 
-/// Rows become columns.
+/// Transposes rows and columns.
 [[gnu::always_inline]] inline void transpose(std::array<Four, 4>& rows) {
   const Four low_a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5);
   const Four low_b = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5);
@@ -45,7 +45,7 @@ typedef float Four __attribute__((vector_size(16)));
 
   std::size_t i = 0;
   for (; i + 4 <= points.size(); i += 4) {
-    // What comes after this block, while there is something else to do.
+    // Prefetches the next block.
     __builtin_prefetch(points.data() + i + kSize);
     __builtin_prefetch(points.data() + i + kSize + 2);
 
@@ -67,7 +67,7 @@ typedef float Four __attribute__((vector_size(16)));
   }
 }
 
-/// The other way round.
+/// The inverse.
 [[gnu::always_inline]] inline void put_together(std::size_t count, PointBlock& block) {
   static_assert(sizeof(RingPoint) == 2 * sizeof(Four) && offsetof(RingPoint, azimuth_rad) == 12 &&
                 offsetof(RingPoint, range_m) == 16 && offsetof(RingPoint, is_in_range) == 28);
@@ -87,7 +87,7 @@ typedef float Four __attribute__((vector_size(16)));
 
 [[gnu::always_inline]] inline void level(const Levelling& by, std::size_t count,
                                          PointBlock& block) {
-  // A copy, which no write to the block can change.
+  // A copy, so that writes to the block cannot change it.
   const Eigen::Matrix3f turn = by.level_R_vehicle;
   for (std::size_t i = 0; i < count; ++i) {
     const float x = turn(0, 0) * block.x[i] + turn(0, 1) * block.y[i] + turn(0, 2) * block.z[i];
@@ -110,7 +110,7 @@ typedef float Four __attribute__((vector_size(16)));
   std::array<float, kSize> b;
   std::array<std::int32_t, kSize> index;
 
-  // Each place falls into one span of the grid, at the shares a and b of it.
+  // Each point lies in one span of the grid, at the fractions a and b of it.
   for (std::size_t i = 0; i < count; ++i) {
     const float u = at.place(x[i], at.corner_x_m);
     const float v = at.place(y[i], at.corner_y_m);
@@ -138,7 +138,7 @@ typedef float Four __attribute__((vector_size(16)));
 [[gnu::always_inline]] inline void locate_all(std::span<const model::SweepPoint> points,
                                               const Levelling& by, const GroundGrid& grid,
                                               PointBlock& block) {
-  // What lies beyond the last point is computed and never looked at.
+  // Values beyond the last point are computed and ignored.
   const std::size_t count = padded_to_lanes(points.size());
   take_apart(points, block);
   level(by, count, block);
@@ -161,7 +161,7 @@ typedef float Four __attribute__((vector_size(16)));
     const std::int32_t cell =
         ((v & 3) * 4 + (u & 3)) * at.plane + (v >> 2) * at.nodes_per_side + (u >> 2);
 
-    // A number that is none is in no range.
+    // NaN fails every comparison.
     const bool counts = static_cast<int>(range2 >= nearest2) &
                         static_cast<int>(range2 <= farthest2) &
                         static_cast<int>(std::abs(block.z[i]) < kHighest_m);
@@ -191,7 +191,7 @@ typedef float Four __attribute__((vector_size(16)));
     block.range[i] = std::sqrt(range2);
     block.azimuth[i] = fast_atan2(dy, dx);
 
-    // A number that is none is in no range.
+    // NaN fails every comparison.
     const bool counts = static_cast<int>(range2 >= nearest2) &
                         static_cast<int>(range2 <= farthest2) &
                         static_cast<int>(std::abs(block.z[i]) < kHighest_m);

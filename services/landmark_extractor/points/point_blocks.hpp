@@ -11,17 +11,17 @@
 
 namespace understory::landmark_extractor::points {
 
-/// A return in `vehicle_level`, with the beam that brought it. As long as one vector register, and
-/// without initial values, so that memory for many costs nothing before they come.
+/// A return in `vehicle_level`, with its beam. As long as one vector register, and without initial
+/// values, so that allocating memory for many costs nothing.
 struct alignas(32) RingPoint {
   float x_m;
   float y_m;
   float z_m;
-  float azimuth_rad;  ///< Of the beam, left positive; goes on beyond pi within a ring.
-  float range_m;      ///< Horizontal distance from where the sensor was at that time.
+  float azimuth_rad;  ///< Of the beam, left positive; continuous beyond pi within a ring.
+  float range_m;      ///< Horizontal distance from the sensor's position at that time.
   float height_m;     ///< Above ground.
   float time_s;       ///< From the sweep's utime.
-  float is_in_range;  ///< 1, or 0 where a coordinate is too near, too far or no number.
+  float is_in_range;  ///< 1, or 0 if a coordinate is too near, too far or NaN.
 
   /// In the plan.
   Eigen::Vector2d position() const { return {x_m, y_m}; }
@@ -46,20 +46,20 @@ struct PointBlock {
   Array<RingPoint> points{};
 };
 
-/// How points of a sweep become points around the sensor.
+/// Conversion of a sweep's points to levelled points around the sensor.
 struct Levelling {
   Eigen::Matrix3f level_R_vehicle = Eigen::Matrix3f::Identity();
   Eigen::Vector3f sensor_m = Eigen::Vector3f::Zero();      ///< Frame `vehicle_level`, at utime.
-  Eigen::Vector3f velocity_mps = Eigen::Vector3f::Zero();  ///< The same frame.
+  Eigen::Vector3f velocity_mps = Eigen::Vector3f::Zero();  ///< Same frame.
   float min_range_m = 0.0F;                                ///< Horizontal distance to the sensor.
   float max_range_m = 0.0F;                                ///< Likewise.
 };
 
-/// Above or below the vehicle: nothing on the ground is so far up [m].
+/// Above or below the vehicle: points on the ground are within this [m].
 inline constexpr float kHighest_m = 1000.0F;
 
-/// Fills x, y, z and cell, which is nowhere() for points that do not count: out of range of where
-/// the sensor is at utime, or no numbers. Precondition: at most PointBlock::kSize points.
+/// Fills x, y, z and cell, which is nowhere() for points that are not used: out of range from the
+/// sensor's position at utime, or NaN. Precondition: at most PointBlock::kSize points.
 void locate_block(std::span<const model::SweepPoint> points, const Levelling& by,
                   const GroundGrid& grid, PointBlock& block);
 /// Fills `points`, levelled and with heights above ground. `patches`: one per node of the grid.

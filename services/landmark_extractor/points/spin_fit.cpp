@@ -10,23 +10,25 @@ namespace understory::landmark_extractor::points {
 namespace {
 
 constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
-/// So many points are enough for the motion.
+/// Number of points that is sufficient for the motion.
 constexpr std::size_t kSample = 2000;
 constexpr std::size_t kTogether = 4;
 constexpr int kRounds = 3;
-/// What one more round would change is less than the square of this in parts of the range.
+/// The iteration ends when the next step would be smaller than the square of this, relative to the
+/// range.
 constexpr double kSettledRate = 0.01;
 constexpr double kSettledSpeed_mps = 0.3;
-/// So many neighbours are enough for the rate of the spin to begin with.
+/// Number of neighbours that is sufficient for the initial rate of the spin.
 constexpr std::size_t kRates = 300;
-/// Beams rotate evenly to this [rad]; with a motor that does not the motion cannot be found.
+/// Largest deviation from a constant rate [rad]; with an uneven motor the motion cannot be
+/// estimated.
 constexpr double kEvenness = 0.01;
-/// A vehicle is not faster [m/s].
+/// Upper bound of a vehicle's speed [m/s].
 constexpr double kSpeedPrior = 40.0;
 
 }  // namespace
 
-/// Rate of the spin [rad/s] from neighbours of one ring: the median; and which way it goes.
+/// Rate of the spin [rad/s] from neighbours of one ring: the median; and its direction.
 float SpinFitter::look_at_neighbours(const model::PointSweep& sweep, std::uint16_t ring,
                                      Spin& spin) {
   rates_.clear();
@@ -59,7 +61,7 @@ float SpinFitter::look_at_neighbours(const model::PointSweep& sweep, std::uint16
 }
 
 void SpinFitter::take_samples(const model::PointSweep& sweep, double max_range_m) {
-  // Some neighbours at a time, which memory brings together.
+  // Several neighbours at a time, which share cache lines.
   const std::size_t stride = kTogether * std::max<std::size_t>(1, sweep.points.size() / kSample);
   samples_.clear();
   means_.assign(sweep.rings, {});
@@ -77,7 +79,7 @@ void SpinFitter::take_samples(const model::PointSweep& sweep, double max_range_m
   for (std::size_t first = 0; first < sweep.points.size(); first += stride + shift) {
     const std::size_t end = std::min(first + kTogether, sweep.points.size());
     for (std::size_t i = first; i < end; ++i) take(sweep.points[i]);
-    // By turns longer and shorter, so that every ring gets its share.
+    // Alternates longer and shorter steps, so that every ring is sampled.
     shift = (shift + kTogether + 1) % (3 * kTogether);
   }
 }
@@ -101,7 +103,7 @@ bool SpinFitter::improve() {
     rows_[i] = {sample.time_s, lever * y, -lever * x, fast_atan2(y, x) - rate * sample.time_s};
   }
 
-  // Their sums, each ring's mean taken out.
+  // Their sums, with each ring's mean subtracted.
   Eigen::Matrix4d sums = Eigen::Matrix4d::Zero();
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     Means& mean = means_[samples_[i].ring];

@@ -1,4 +1,4 @@
-// How the sensor moved during a revolution, from the points of the sweep alone.
+// Motion of the sensor during a revolution, from the points of the sweep alone.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,24 +14,25 @@ namespace understory::landmark_extractor::points {
 
 /// Motion of the sensor, in the frame of the points.
 struct Spin {
-  /// Of the sensor in the plan; zero where the times are unknown or do not fit.
+  /// Of the sensor in the plan; zero if the times are unknown or do not fit.
   Eigen::Vector2f velocity_mps = Eigen::Vector2f::Zero();
   float rate_radps = 0.0F;  ///< Left positive; 0 = unknown.
   bool is_leftward = true;  ///< Direction of the rotation, seen from above.
 };
 
-/// A sensor rotates evenly: the azimuth of its beams grows linearly with time, each ring from an
-/// offset of its own. A de-skewed point at time t was seen from `velocity * t` away, which changes
-/// its azimuth by parallax; the velocity sought is the one after which beams rotate evenly (least
-/// squares on a part of the points). Keeps its memory from sweep to sweep, but no state.
+/// A sensor rotates at a constant rate: the azimuth of its beams grows linearly with time, each
+/// ring with its own offset. A de-skewed point at time t was seen from `velocity * t` away, which
+/// changes its azimuth by parallax; the velocity is estimated such that the beams rotate at a
+/// constant rate (least squares on a part of the points). Reuses memory between sweeps, but has no
+/// state.
 class SpinFitter {
  public:
-  /// Sets the spin from points within `max_range_m`. The velocity is zero and the rate unknown
-  /// where the sweep has no times, or the beams do not rotate evenly to 0.01 rad.
+  /// Sets the spin from points within `max_range_m`. The velocity is zero and the rate unknown if
+  /// the sweep has no times, or the rotation of the beams is not constant to 0.01 rad.
   void fit(const model::PointSweep& sweep, double max_range_m, Spin& spin);
 
  private:
-  /// One point as its beam is seen from where the sensor is at utime.
+  /// One point as seen from the sensor's position at utime.
   struct Sample {
     float x;
     float y;
@@ -49,7 +50,7 @@ class SpinFitter {
   struct Means {
     double count = 0.0;
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();  ///< Of (t, d azimuth / d velocity, residual).
-    float offset = 0.0F;                            ///< Of the first residual.
+    float offset = 0.0F;                            ///< Whether another iteration is needed.
     std::size_t samples = 0;
   };
 

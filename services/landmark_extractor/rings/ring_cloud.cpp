@@ -9,13 +9,13 @@ namespace understory::landmark_extractor::rings {
 namespace {
 
 constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
-/// A ring has the slope of a return that is not farther away, whatever the sensor's tilt.
+/// A ring's slope is taken from a return within this azimuth, whatever the sensor's tilt.
 constexpr float kKnownSlope_rad = 0.1F;
 
-/// So many steps from beam to beam give their median; so many of them lie together.
+/// Number of steps from beam to beam for their median, and how many of them are adjacent.
 constexpr std::size_t kSteps = 40;
 constexpr std::size_t kTogether = 4;
-/// So many points give the slope of a ring.
+/// Number of points for the slope of a ring.
 constexpr std::size_t kSlopes = 16;
 
 }  // namespace
@@ -50,7 +50,7 @@ void RingCloud::order(std::size_t ring, float lowest_m) {
   measure_slope(ring);
 }
 
-/// The median of some differences; neighbours side by side cost the least time to look at.
+/// The median of some differences; adjacent points are the fastest to read.
 void RingCloud::measure_step(Ring& ring) {
   const std::span points = slots_.points();
   differences_.clear();
@@ -101,7 +101,7 @@ std::size_t RingCloud::first_at(std::size_t ring, float azimuth_rad) const {
   while (beyond >= kTurn) beyond -= kTurn;
   const float azimuth = start + beyond;
 
-  // Beams without a return make it come sooner than even steps would.
+  // Beams without a return make the index smaller than constant steps would.
   const float step = rings_[ring].step_rad;
   const auto guess = step > 0.0F ? static_cast<std::size_t>(beyond / step) : 0;
   std::size_t high = std::min(end, begin + guess + 1);

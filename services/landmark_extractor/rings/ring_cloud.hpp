@@ -1,4 +1,4 @@
-// The points of one revolution, levelled and put in order: ring by ring, each in order of azimuth.
+// The points of one revolution, levelled and sorted: ring by ring, each in order of azimuth.
 #pragma once
 
 #include <Eigen/Core>
@@ -44,50 +44,53 @@ class RoughSlopes {
   Eigen::Vector3f up_;
 };
 
-/// The levelled, ordered points of one sweep and where the sensor was when it measured them. Keeps
-/// its memory from sweep to sweep; nothing of one sweep enters the next. Call look_at(), fill(),
-/// then order() once for each ring.
+/// The levelled, sorted points of one sweep and the sensor's position at each of them. Reuses
+/// memory between sweeps; no data of one sweep enter the next. Call look_at(), fill(), then order()
+/// once for each ring.
 class RingCloud {
  public:
-  /// Learns the sensor's attitude and motion. Precondition: 1 <= sweep.rings, attitude finite.
+  /// Sets the sensor's attitude and estimates its motion. Precondition: 1 <= sweep.rings, attitude
+  /// finite.
   const points::Levelling& look_at(const model::PointSweep& sweep, double min_range_m,
                                    double max_range_m);
-  /// Takes the points whose horizontal distance to the sensor is within the limits. Adds to
-  /// `counters`. Precondition: look_at() the same sweep.
+  /// Adds the points whose horizontal distance to the sensor is within the limits. Adds to
+  /// `counters`. Precondition: look_at() with the same sweep.
   void fill(const model::PointSweep& sweep, const ground::GroundSurface& ground,
             PointCounters& counters);
 
-  /// Puts one ring in order: once for each ring after fill(), before its points are asked for. On
-  /// its own so that what follows finds the ring in the cache. What is lower than `lowest_m` above
-  /// ground is no object.
+  /// Sorts one ring: once for each ring after fill(), before its points are used. A separate call,
+  /// so that the next steps find the ring in the cache. Points lower than `lowest_m` above ground
+  /// belong to no object.
   void order(std::size_t ring, float lowest_m);
 
-  std::size_t rings() const { return rings_.size(); }  ///< As many as the sensor has.
-  /// Of all rings, by index; between the rings are gaps, which mean nothing.
+  std::size_t rings() const { return rings_.size(); }  ///< Number of the sensor's rings.
+  /// Of all rings, by index; the gaps between the rings are undefined.
   std::span<const points::RingPoint> points() const { return slots_.points(); }
   /// Returns beyond the range, of all rings, levelled; they have no height above ground.
   std::span<const points::RingPoint> far_points() const { return slots_.far_points(); }
   std::size_t ring_begin(std::size_t ring) const { return rings_[ring].begin; }  ///< Into points().
-  std::size_t ring_end(std::size_t ring) const { return rings_[ring].end; }  ///< Behind its last.
-  /// Azimuth from beam to beam [rad]; 0 for a ring with too few points to measure it.
+  std::size_t ring_end(std::size_t ring) const {
+    return rings_[ring].end;
+  }  ///< One beyond its last point.
+  /// Azimuth from beam to beam [rad]; 0 for a ring with too few points.
   float step_rad(std::size_t ring) const { return rings_[ring].step_rad; }
   /// Of the sensor at utime, frame `vehicle_level`.
   const Eigen::Vector3f& sensor_m() const { return levelling_.sensor_m; }
-  /// How fast the sensor turns, left positive; 0 = not known.
+  /// Rate of the sensor's rotation, left positive; 0 = unknown.
   float spin_radps() const { return spin_.rate_radps; }
   /// Of the sensor during the revolution, frame `vehicle_level`.
   const Eigen::Vector3f& level_velocity_mps() const { return levelling_.velocity_mps; }
   /// The same in frame `vehicle`, in the plan.
   const Eigen::Vector2f& velocity_mps() const { return spin_.velocity_mps; }
 
-  /// Where the sensor was when it measured the point, and in which direction it looked.
+  /// The sensor's position at the time of the point, and the direction of the beam.
   Sight sight(const points::RingPoint& point) const {
     const Eigen::Vector2d origin =
         (sensor_m().head<2>() + point.time_s * levelling_.velocity_mps.head<2>()).cast<double>();
     return {origin, (point.position() - origin) / static_cast<double>(point.range_m)};
   }
-  /// Where the sensor was when it looked into a direction, from a point that it measured near that
-  /// direction: the sensor rotates evenly.
+  /// The sensor's position at the time of a beam direction, from a measured point near that
+  /// direction: the sensor rotates at a constant rate.
   Eigen::Vector2d origin_towards(float azimuth_rad, const points::RingPoint& point) const {
     float time = point.time_s;
     if (spin_.rate_radps != 0.0F) {
@@ -95,20 +98,19 @@ class RingCloud {
     }
     return (sensor_m().head<2>() + time * levelling_.velocity_mps.head<2>()).cast<double>();
   }
-  /// slope() of all rings without a look at the points: good to a few centimetres in height.
+  /// slope() of all rings without reading the points: accurate to a few centimetres in height.
   RoughSlopes rough_slopes(const Eigen::Vector2f& towards) const {
     return {levelling_.level_R_vehicle, slopes_, towards};
   }
-  /// Rise of a ring's beams per metre of range where they look into a direction. Precondition: the
-  /// ring has points.
+  /// Rise of a ring's beams per metre of range in a direction. Precondition: the ring has points.
   float slope(std::size_t ring, float azimuth_rad) const {
     const std::size_t at = std::min(first_at(ring, azimuth_rad), ring_end(ring) - 1);
     return slope(ring, points()[at], azimuth_rad);
   }
-  /// The same where a point of the ring near that direction is known.
+  /// Likewise, given a point of the ring near that direction.
   float slope(std::size_t ring, const points::RingPoint& near, float azimuth_rad) const;
   /// The first point of the ring at or beyond the azimuth (any turn), as an index into points();
-  /// ring_end(ring) where there is none. Cost: logarithmic, mostly a few steps.
+  /// ring_end(ring) if there is none. Cost: logarithmic, mostly a few steps.
   std::size_t first_at(std::size_t ring, float azimuth_rad) const;
 
  private:

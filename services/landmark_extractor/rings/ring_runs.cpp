@@ -7,11 +7,11 @@
 namespace understory::landmark_extractor::rings {
 namespace {
 
-/// So many beams without a return in the middle of an object are drop-outs.
+/// Up to this number of beams without return within an object are drop-outs.
 constexpr float kDropOuts = 3.5F;
-/// The next beam gave a return: it is not farther than this many steps away.
+/// Largest distance of two neighbouring beams with returns, in steps.
 constexpr float kNextBeam = 1.6F;
-/// Neighbouring returns from bark or a wall, not from leaves, differ less in range.
+/// Neighbouring returns from bark or a wall, unlike leaves, differ in range by less than this.
 constexpr float kSmooth_m = 0.06F;
 
 class RunFinder {
@@ -57,23 +57,23 @@ class RunFinder {
     return dx * dx + dy * dy <= limit * limit && q.azimuth_rad - p.azimuth_rad <= kDropOuts * step_;
   }
 
-  /// Between the azimuths of two points.
+  /// Difference of the azimuths of two points.
   float gap(std::size_t a, std::size_t b) const {
     const float gap = std::abs(points_[a].azimuth_rad - points_[b].azimuth_rad);
     return gap > std::numbers::pi_v<float> ? std::abs(gap - 2.0F * std::numbers::pi_v<float>) : gap;
   }
 
-  /// What lies beside the point `edge`: `beyond` is its neighbour in the ring, `gap` rad away.
+  /// Border at the point `edge`: `beyond` is its neighbour in the ring, `gap` rad away.
   planar::Border border(std::size_t edge, std::size_t beyond, float gap) const {
     const float behind = points_[beyond].range_m - points_[edge].range_m;
     if (gap > kDropOuts * step_) return planar::Border::kClear;
     if (behind < -clearance_) return planar::Border::kOccluded;
     if (gap > kNextBeam * step_ || behind > clearance_) return planar::Border::kClear;
-    // Ground that rises beside an object hides nothing of it.
+    // Rising ground beside an object hides no part of it.
     return points_[beyond].height_m <= lowest_ ? planar::Border::kClear : planar::Border::kCrowded;
   }
 
-  /// Runs that are neither a trunk's slice nor a piece of a wall are of no use.
+  /// Ignores runs that are neither a slice of a trunk nor a piece of a wall.
   void add(std::size_t first, std::size_t last, std::vector<Run>& runs) const {
     Run run;
     run.first = static_cast<std::uint32_t>(first);
@@ -112,7 +112,7 @@ class RunFinder {
     place(run);
   }
 
-  /// Beams between two returns from one smooth surface met it, too.
+  /// Beams between two returns from one smooth surface hit it, too.
   void count_lost(Run& run) const {
     for (std::size_t i = run.first; i < run.last; ++i) {
       const points::RingPoint& point = points_[i];
@@ -127,11 +127,11 @@ class RunFinder {
   void place(Run& run) const {
     const points::RingPoint& middle = points_[(run.first + run.last) / 2];
     const float behind = run.nearest_m + 0.5F * run.width_m;
-    // Relative to a point of the run: the sensor moved during the turn.
+    // Relative to a point of the run: the sensor moved during the revolution.
     const Eigen::Vector2f origin = sensor_.head<2>() + middle.time_s * velocity_.head<2>();
     const Eigen::Vector2f beam =
         (Eigen::Vector2f(middle.x_m, middle.y_m) - origin) / middle.range_m;
-    // By a few steps at most, as far as it is a trunk's.
+    // By a few steps at most, if the run belongs to a trunk.
     const float turn = 0.5F * (points_[run.first].azimuth_rad + points_[run.last].azimuth_rad) -
                        middle.azimuth_rad;
     const float cosine = 1.0F - 0.5F * turn * turn;

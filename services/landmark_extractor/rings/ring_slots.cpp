@@ -10,9 +10,9 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kFullTurn = 2.0F * kPi;
-/// Where one return is so much nearer or farther than its neighbour, a ring may be cut.
+/// A ring may be cut between neighbouring returns that differ in range by more than this.
 constexpr float kCut_m = 1.0F;
-/// So many points ahead memory is asked for.
+/// Distance of the prefetch in points.
 constexpr std::ptrdiff_t kAhead = 4;
 
 }  // namespace
@@ -34,8 +34,8 @@ void RingSlots::fill(const model::PointSweep& sweep, const points::Levelling& le
 
 void RingSlots::reserve(std::size_t rings, std::size_t points_per_ring) {
   if (slot_ < 2 * points_per_ring) {
-    // Half as much again, so that sweeps which grow little by little seldom ask for more; an odd
-    // number of cache lines, so that the rings' ends do not crowd into a few of the sets.
+    // Half as much again, so that slowly growing sweeps rarely reallocate; an odd number of cache
+    // lines, so that the rings' ends do not fall into a few cache sets.
     constexpr std::size_t kUnit = 2;
     slot_ = (3 * points_per_ring / kUnit | 1U) * kUnit;
   }
@@ -56,7 +56,7 @@ void RingSlots::reserve(std::size_t rings, std::size_t points_per_ring) {
 
 bool RingSlots::scatter(const model::PointSweep& sweep, const points::Levelling& levelling,
                         const ground::GroundSurface& ground, PointCounters& counters) {
-  // Copies, which no write to a point can change.
+  // Copies, so that writes to a point cannot change them.
   const std::ptrdiff_t forward = is_leftward_ ? 1 : -1;
   const std::uint16_t rings = sweep.rings;
   Filling* const filling = filling_.data();
@@ -81,7 +81,7 @@ bool RingSlots::scatter(const model::PointSweep& sweep, const points::Levelling&
         continue;
       }
 
-      // Azimuth goes on beyond pi within a ring.
+      // The azimuth is continuous beyond pi within a ring.
       Filling& here = filling[ring];
       points::RingPoint* const place = here.next;
       if (place == here.full) return false;
@@ -97,7 +97,7 @@ bool RingSlots::scatter(const model::PointSweep& sweep, const points::Levelling&
       here.next = place + forward;
       *place = point;
       place->azimuth_rad = azimuth;
-      // As many streams as there are rings are more than the processor foresees by itself.
+      // With one stream per ring the processor's own prefetcher does not keep up.
       __builtin_prefetch(place + kAhead * forward, 1);
     }
   }
@@ -111,7 +111,7 @@ IndexRange RingSlots::cut(std::size_t ring, float lowest_m) {
   const std::size_t begin = is_leftward_ ? ring * slot_ : (ring + 1) * slot_ - count;
   const std::size_t end = begin + count;
 
-  // Cut at the ground, or where the range jumps.
+  // Cuts at the ground, or at a jump of the range.
   const auto parts = [&](std::size_t a, std::size_t b) {
     return points_[a].height_m <= lowest_m ||
            std::abs(points_[a].range_m - points_[b].range_m) > kCut_m;
@@ -126,7 +126,7 @@ IndexRange RingSlots::cut(std::size_t ring, float lowest_m) {
 
   const std::size_t from = is_leftward_ ? begin : end - cut;
   const std::size_t to = is_leftward_ ? end : begin - cut;
-  // Ascends by less than half a turn where the ends meet.
+  // The azimuth increases by less than half a turn across the joined ends.
   const float ascent = is_leftward_ ? points_[from].azimuth_rad - points_[end - 1].azimuth_rad
                                     : points_[begin].azimuth_rad - points_[end - 1].azimuth_rad;
   const float turn = kFullTurn * std::round(ascent / kFullTurn) * (is_leftward_ ? -1.0F : 1.0F);

@@ -11,15 +11,15 @@ namespace understory::landmark_extractor::trunks {
 namespace {
 
 constexpr int kIterations = 8;
-/// The next step of the estimate would be smaller by far than this one's square...
+/// The next step of the estimate would be far smaller than the square of this one...
 constexpr double kSettled_m2 = 4e-7;
-/// ... and near enough to tell which runs agree.
+/// ... and the estimate is accurate enough to select the agreeing runs.
 constexpr double kNearlySettled_m2 = 1e-5;
-/// A run disagrees whose ranges are so far off in root mean square, or an edge of it [sigma].
+/// A run disagrees if the root mean square of its ranges, or an edge of it, is off by more [sigma].
 constexpr float kMaxRunResidual = 2.5F;
 constexpr float kMaxEdgeResidual = 3.5F;
 constexpr int kConsensusRounds = 4;
-/// Runs of one stem seem so far apart, and so much more per metre of height.
+/// Largest distance between runs of one stem, and its increase per metre of height.
 constexpr float kConsensus_m = 0.06F;
 constexpr float kConsensusLean = 0.06F;
 
@@ -32,7 +32,7 @@ std::optional<StemFit> StemFitter::fit(const rings::RingCloud& cloud,
   start_with_consensus();
   if (!has_enough()) return std::nullopt;
 
-  // Fit, leave out what disagrees, and fit again.
+  // Fits, removes disagreeing runs, and fits again.
   evidence_.take(cloud, runs);
   Vector6d state = Vector6d::Zero();
   for (int round = 0; round < kConsensusRounds; ++round) {
@@ -52,7 +52,7 @@ std::optional<StemFit> StemFitter::fit(const rings::RingCloud& cloud,
   return fit;
 }
 
-/// The largest group of runs with nearly the same centre, counted in points.
+/// Selects the largest group of runs with nearly the same centre, counted in points.
 void StemFitter::start_with_consensus() {
   const std::size_t count = std::min(evidence_.runs().size(), kMaxRuns);
   const auto near = [](const RunSummary& a, const RunSummary& b) {
@@ -170,7 +170,7 @@ bool StemFitter::settle(Vector6d& state, double settled_m2) {
     if (change.head<3>().squaredNorm() < settled_m2) break;
   }
 
-  // A stem before the sensor, not around it.
+  // The stem must be in front of the sensor, not around it.
   const HitLanes& any = used_.hits().front();
   return (state[0] - any.origin_x[0]) * any.along_x[0] +
              (state[1] - any.origin_y[0]) * any.along_y[0] >
@@ -213,7 +213,8 @@ void StemFitter::describe(const Vector6d& state, StemFit& fit) const {
   double squares = 0.0;
   linearise(state, information, gradient, squares);
 
-  // What grazing beams and edges weigh less than their noise is lost, not unknown.
+  // Grazing beams and edges are weighted below their information: the covariance follows from the
+  // weights.
   const Matrix6d inverse = information.inverse();
   fit.covariance = inverse * (information - unused_information(state)) * inverse;
 
@@ -233,7 +234,7 @@ void StemFitter::describe(const Vector6d& state, StemFit& fit) const {
     }
   }
 
-  // Is it rather a strip of a wall?
+  // Is it more likely a strip of a wall?
   const PlaneComparison plane =
       compare_with_plane(used_.hits(), stem_of(state), noise_, sweep_, trunk_);
   fit.width_m = plane.width_m;

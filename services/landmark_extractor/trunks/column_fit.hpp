@@ -1,4 +1,4 @@
-// A round, leaning, tapering stem through the runs of one column.
+// Fit of a round, leaning, tapering stem to the runs of one column.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,11 +21,11 @@ struct StemFit {
   double low_z_m = 0.0;               ///< Of the lowest run that agrees.
   double high_z_m = 0.0;              ///< Of the highest one.
   double width_m = 0.0;               ///< Of the hits, as seen from above.
-  double flat_excess = 0.0;  ///< How much worse an upright plane explains the hits [chi^2].
+  double flat_excess = 0.0;  ///< chi^2 of an upright plane minus that of the stem, for the hits.
   std::size_t points = 0;    ///< On runs that agree.
   std::size_t rings = 0;     ///< Of runs that agree.
-  bool sees_left = false;    ///< An edge on that side.
-  bool sees_right = false;   ///< An edge on that side.
+  bool sees_left = false;    ///< It has an edge on that side.
+  bool sees_right = false;   ///< It has an edge on that side.
 
   /// Of the axis at a height, frame `vehicle_level`.
   Eigen::Vector2d centre_at(double z_m) const {
@@ -35,10 +35,10 @@ struct StemFit {
   double radius_at(double z_m) const { return state[2] + (z_m - reference_z_m) * state[5]; }
 };
 
-/// Maximum a posteriori estimate from the ranges of the beams, the lines of sight past the edges
-/// that are seen, and priors of radius, taper and lean, which decide where little is seen. Runs
-/// that do not agree with the rest (branches, leaves) are left out and the rest is fitted again.
-/// Keeps its memory from column to column. Cost: some 10 us.
+/// Maximum a posteriori estimate from the ranges of the beams, the lines of sight past visible
+/// edges, and priors of radius, taper and lean, which dominate with few measurements. Runs that do
+/// not agree with the rest (branches, leaves) are removed and the rest is fitted again. Reuses
+/// memory between columns. Cost: some 10 us.
 class StemFitter {
  public:
   /// Noise, priors and limits are taken from the parameters.
@@ -50,10 +50,11 @@ class StemFitter {
                static_cast<float>(sweep.beam_width_rad)},
         evidence_(sweep, trunk) {}
 
-  /// None where the estimate does not settle on a stem before the sensor, or too few runs agree.
+  /// None if the estimate does not converge to a stem in front of the sensor, or too few runs
+  /// agree.
   std::optional<StemFit> fit(const rings::RingCloud& cloud, const std::vector<rings::Run>& runs,
                              const Column& column);
-  /// How likely a beam without a return beside a run met the stem, too.
+  /// Sets the probability that a beam without a return beside a run hit the stem, too.
   void expect_lost(double share) { evidence_.expect_lost(share); }
 
  private:
@@ -62,9 +63,9 @@ class StemFitter {
   bool settle(Vector6d& state, double settled_m2);
   void linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient,
                  double& squares) const;
-  /// What grazing hits and edges know and do not weigh.
+  /// Correction of the information for reduced weights; see add_unused().
   Matrix6d unused_information(const Vector6d& state) const;
-  /// Whether the runs that agree are others than before.
+  /// Whether the set of agreeing runs has changed.
   bool sort_out(const Vector6d& state);
   StemState stem_of(const Vector6d& state) const;
   bool has_enough() const;
@@ -75,8 +76,8 @@ class StemFitter {
   BeamNoise noise_;
   StemEvidence evidence_;                   ///< Of all runs of the column.
   AgreeingEvidence used_;                   ///< Of those that agree.
-  std::optional<double> reference_z_m_;     ///< That a state is for; none before the first.
-  std::vector<std::uint32_t> agreeing_at_;  ///< Places among the column's runs.
+  std::optional<double> reference_z_m_;     ///< Of the state; none before the first fit.
+  std::vector<std::uint32_t> agreeing_at_;  ///< Indices among the column's runs.
   std::vector<std::uint32_t> still_agreeing_at_;
   std::vector<float> hit_means_;
   std::vector<Lanes> edge_squares_;

@@ -12,7 +12,7 @@
 namespace understory::landmark_extractor::trunks {
 namespace {
 
-/// Points scatter across a plane at least so much, however it is looked at.
+/// Least scatter of points across a plane, from any direction.
 constexpr double kLeastAcross_m = 0.003;
 
 }  // namespace
@@ -57,7 +57,7 @@ PlaneComparison compare_with_plane(const std::vector<HitLanes>& hits, const Stem
              square(kLeastAcross_m));
   });
 
-  // The same of the stem.
+  // Likewise for the stem.
   std::array<float, kMaxRuns> hit_means{};
   square_terms(hits, {}, stem, noise, std::span(hit_means).first(hits.size()), {});
   double round = 0.0;

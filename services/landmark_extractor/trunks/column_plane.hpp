@@ -1,4 +1,4 @@
-// Is it a stem or a strip of a wall?
+// Distinguishes a stem from a strip of a wall.
 #pragma once
 
 #include <vector>
@@ -8,14 +8,14 @@
 
 namespace understory::landmark_extractor::trunks {
 
-/// An upright plane against a stem through the same hits.
+/// Comparison of an upright plane and a stem for the same hits.
 struct PlaneComparison {
   double width_m = 0.0;      ///< Of the hits along the plane.
-  double flat_excess = 0.0;  ///< How much worse the plane explains the hits than the stem [chi^2].
+  double flat_excess = 0.0;  ///< chi^2 of the plane minus that of the stem.
 };
 
-/// Fits a plane by total least squares. A strip of a wall looks like a thick stem of which little
-/// is seen; then the excess is negative. Precondition: at least one hit, at most `kMaxRuns` groups.
+/// Fits a plane by total least squares. A strip of a wall resembles a thick stem of which little is
+/// seen; then the excess is negative. Precondition: at least one hit, at most `kMaxRuns` groups.
 PlaneComparison compare_with_plane(const std::vector<HitLanes>& hits, const StemState& stem,
                                    const BeamNoise& noise, const SweepParameters& sweep,
                                    const SweepTrunkParameters& trunk);

@@ -1,11 +1,11 @@
-// How an error of roll and pitch moves a place in `vehicle_level`.
+// Effect of roll and pitch errors on a position in `vehicle_level`.
 #pragma once
 
 #include <Eigen/Core>
 
 namespace understory::landmark_extractor::trunks {
 
-/// Covariance [m^2] of a place from that of (roll, pitch) [rad^2] which levelled it.
+/// Covariance [m^2] of a position, from that of (roll, pitch) [rad^2] used for its levelling.
 inline Eigen::Matrix3d from_level_error(const Eigen::Vector3d& place_m,
                                         const Eigen::Matrix2d& level_covariance_rad2) {
   Eigen::Matrix<double, 3, 2> jacobian;

@@ -40,7 +40,7 @@ void StemEvidence::take(const rings::RingCloud& cloud, const std::vector<rings::
   }
 }
 
-/// Some of its points, spread over the run.
+/// Adds some of its points, distributed over the run.
 void StemEvidence::add_hits(const rings::RingCloud& cloud, const rings::Run& run,
                             HitLanes& hits) const {
   const std::size_t count = std::min(run.size(), kHitsPerRun);
@@ -58,8 +58,8 @@ void StemEvidence::add_hits(const rings::RingCloud& cloud, const rings::Run& run
   }
 }
 
-/// The edge lies somewhere between the run's last beam and the next; or, where that gave no return
-/// and may have been lost, between that and the one after it.
+/// The edge lies between the run's last beam and the next; if that gave no return and may have been
+/// lost, also between that and the one after it.
 void StemEvidence::add_edge(const rings::RingCloud& cloud, const rings::Run& run, float side,
                             EdgeLanes& edges, std::size_t lane) const {
   const points::RingPoint& last = cloud.points()[side > 0.0F ? run.last : run.first];
@@ -121,18 +121,18 @@ void AgreeingEvidence::use_edge(const EdgeLanes& from, std::size_t lane) {
   to.counts[to_lane] = 1.0F;
 }
 
-/// Rings that fire at the same azimuths miss an upright edge by the same part of a step: together
-/// they measure no more than one does. Their common information counts by their number, so that one
-/// ring that lost a beam at the edge does not outweigh all others.
-/// Of an edge that slants over M columns in N rings, the steps' errors are no independent draws:
-/// they run through the step, and their mean is off by 1 / (2 M^2) of a step's variance, or M / N^2
-/// where that is more (within a fifth of what a simulation of such lines gives).
+/// Rings that fire at the same azimuths have the same error of a fraction of a step at an upright
+/// edge: together they measure no more than one does. Their common information is weighted by their
+/// number, so that one ring that lost a beam at the edge does not outweigh all others.
+/// At an edge that slants over M columns in N rings, the errors are not independent: they run
+/// through the step, and their mean has a variance of 1 / (2 M^2) of a step's, or M / N^2 if that
+/// is larger (within a fifth of a simulation of such lines).
 void AgreeingEvidence::share_edges() {
   std::array<float, 2 * kMaxRuns> shares{};
   const float range2 = square(hits_.front().range[0]);
   const auto lane_of = [](std::size_t i) { return i % kLanes; };
 
-  // How many edges are at the same place as each.
+  // Number of edges at the azimuth of each.
   for (std::size_t i = 0; i < edge_count_; ++i) {
     const EdgeLanes& a = edges_[i / kLanes];
     const std::size_t l = lane_of(i);
@@ -145,7 +145,7 @@ void AgreeingEvidence::share_edges() {
     }
   }
 
-  // Of each side: how many edges, and at how many places.
+  // Of each side: number of edges, and number of azimuths.
   std::array<float, 2> edges{};
   std::array<float, 2> places{};
   const auto side_of = [&](std::size_t i) {

@@ -1,4 +1,4 @@
-// What the beams measure of one column of runs, as the stem's fit needs it.
+// Measurements of one column of runs, prepared for the fit of a stem.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,10 +11,10 @@
 
 namespace understory::landmark_extractor::trunks {
 
-/// More evidence than this costs time and adds nothing beyond the shape's own uncertainty.
+/// More runs than this cost time without reducing the uncertainty, which the shape then dominates.
 inline constexpr std::size_t kMaxRuns = 10;
 
-/// What is asked of a run again and again. Frame `vehicle_level`.
+/// Frequently used values of a run. Frame `vehicle_level`.
 struct RunSummary {
   std::uint32_t index = 0;  ///< Of the run, among those of the sweep.
   float x_m = 0.0F;         ///< Of the centre.
@@ -27,25 +27,25 @@ struct RunSummary {
   std::uint16_t middle = 0;  ///< Lane of the hit in the middle.
 };
 
-/// Beams that hit the runs of a column and lines of sight past their edges, about the column's
-/// centre. Keeps its memory from column to column.
+/// Beams that hit the runs of a column and lines of sight past their edges, relative to the
+/// column's centre. Reuses memory between columns.
 class StemEvidence {
  public:
   /// Noise and beam width are taken from the parameters.
   StemEvidence(const SweepParameters& sweep, const SweepTrunkParameters& trunk)
       : sweep_(sweep), trunk_(trunk) {}
 
-  /// How likely a beam without a return beside a run met the stem, too.
+  /// Sets the probability that a beam without a return beside a run hit the stem, too.
   void expect_lost(double share) { lost_share_ = share; }
-  /// Starts with a column: its runs in short.
+  /// Starts with a column: summarises its runs.
   void summarise(const std::vector<rings::Run>& runs, const Column& column);
-  /// Hits and edges of the runs that were summarised.
+  /// Adds hits and edges of the summarised runs.
   void take(const rings::RingCloud& cloud, const std::vector<rings::Run>& runs);
 
-  /// What all coordinates are relative to, frame `vehicle_level`.
+  /// Origin of all coordinates, frame `vehicle_level`.
   const Eigen::Vector2d& anchor_m() const { return anchor_m_; }
   const std::vector<RunSummary>& runs() const { return summaries_; }  ///< In order of height.
-  const std::vector<HitLanes>& hits() const { return hits_; }         ///< A group for each run.
+  const std::vector<HitLanes>& hits() const { return hits_; }         ///< One group per run.
   /// Of the k-th run: lanes 2 k (left) and 2 k + 1 (right).
   const std::vector<EdgeLanes>& edges() const { return edges_; }
 
@@ -63,16 +63,17 @@ class StemEvidence {
   std::vector<EdgeLanes> edges_;
 };
 
-/// The evidence of those runs that agree, of at most `kMaxRuns`. Edges that several rings measure
-/// at the same place share their information.
+/// The measurements of the agreeing runs, at most `kMaxRuns`. Edges that several rings measure at
+/// the same azimuth share their information.
 class AgreeingEvidence {
  public:
-  /// Takes hits and edges of the runs at `places`, spread over the height. Precondition: not empty.
+  /// Adds hits and edges of the runs at `places`, distributed over the height. Precondition: not
+  /// empty.
   void select(const StemEvidence& evidence, const std::vector<std::uint32_t>& places);
 
-  const std::vector<HitLanes>& hits() const { return hits_; }  ///< A group for each run used.
+  const std::vector<HitLanes>& hits() const { return hits_; }  ///< One group per run used.
   const std::vector<EdgeLanes>& edges() const { return edges_; }
-  std::size_t edge_count() const { return edge_count_; }  ///< Lanes of edges() that count.
+  std::size_t edge_count() const { return edge_count_; }  ///< Number of valid lanes in edges().
 
  private:
   void use_edge(const EdgeLanes& from, std::size_t lane);

@@ -9,17 +9,17 @@
 namespace understory::landmark_extractor::trunks {
 namespace {
 
-/// Beams that pass the axis within this part of the radius must meet the stem.
+/// Beams that pass the axis within this share of the radius must hit the stem.
 constexpr double kCore = 0.6;
-/// Returns so near the surface are on the stem [m].
+/// Returns within this distance of the surface are on the stem [m].
 constexpr double kOnStem_m = 0.12;
-/// From here upwards a trunk must be seen where nothing hides it.
+/// Above this height a trunk must be visible unless it is occluded.
 constexpr double kFoot_m = 0.5;
-/// Hardly anybody is taller [m].
+/// Almost no person is taller [m].
 constexpr double kPerson_m = 1.95;
-/// Rings that pass so far above or below are not looked at [m].
+/// Rings that pass farther above or below are skipped [m].
 constexpr double kMargin_m = 0.5;
-/// So many beams do not all drop out.
+/// This number of beams cannot all be drop-outs.
 constexpr double kSureBeams = 2.0;
 
 enum class Met : std::uint8_t { kUnknown, kOn, kBeside, kThrough };
@@ -39,13 +39,13 @@ float azimuth_of(const Eigen::Vector2d& offset) {
 
 float apart(float a, float b) { return std::abs(points::wrap_angle_f(a - b)); }
 
-/// One ring's look at a stem.
+/// The beams of one ring near a stem.
 class Look {
  public:
   Look(const rings::RingCloud& cloud, std::size_t ring, const StemFit& fit, double clearance)
       : cloud_(cloud), ring_(ring), fit_(fit), clearance_(clearance) {
     const Eigen::Vector2d sensor = cloud.sensor_m().head<2>().cast<double>();
-    // The sensor was elsewhere when its beams passed there: their azimuth says when.
+    // The sensor was at another position when its beams passed there: their azimuth gives the time.
     Eigen::Vector2d offset = fit.state.head<2>() - sensor;
     index_ = cloud.first_at(ring, azimuth_of(offset));
     const points::RingPoint& near = at(index_);
@@ -56,7 +56,7 @@ class Look {
     z_m_ = cloud.sensor_m().z() + cloud.slope(ring, near, azimuth_of(offset)) * offset.norm();
   }
 
-  /// Height of the ring where it passes the stem.
+  /// Height of the ring at the stem.
   double z_m() const { return z_m_; }
 
   Met met() const {
@@ -90,7 +90,7 @@ class Look {
   }
 
  private:
-  /// From where the stem is in the ring, the few points back or forth to an azimuth near by.
+  /// Searches from the stem's index in the ring over a few points to an azimuth near by.
   std::size_t first_beyond(float azimuth) const {
     const std::size_t begin = cloud_.ring_begin(ring_);
     const std::size_t end = cloud_.ring_end(ring_);
@@ -108,7 +108,7 @@ class Look {
     return i;
   }
 
-  /// A point of the ring; counts on at its beginning beyond its end.
+  /// A point of the ring; indices beyond its end continue at its beginning.
   const points::RingPoint& at(std::size_t index) const {
     const std::size_t end = cloud_.ring_end(ring_);
     const std::size_t size = end - cloud_.ring_begin(ring_);
@@ -124,8 +124,8 @@ class Look {
   double z_m_ = 0.0;
 };
 
-/// Where beams are so far apart that none passes between a person's height and the least height of
-/// a trunk: whether the next one above passes through.
+/// If no ring passes between a person's height and the least height of a trunk: whether the next
+/// one above passes through.
 bool ends_below_next_ring(const rings::RingCloud& cloud, const StemFit& fit, double ground_z,
                           const SweepParameters& parameters) {
   double lowest = ground_z + parameters.max_height_m;

@@ -1,4 +1,4 @@
-// Whether the beams agree with a stem that was fitted to some of them.
+// Checks a fitted stem against all beams that should hit it.
 #pragma once
 
 #include "services/landmark_extractor/rings/ring_cloud.hpp"
@@ -6,17 +6,17 @@
 
 namespace understory::landmark_extractor::trunks {
 
-/// What those beams met that should meet a stem, counted in rings.
+/// Results of the beams that should hit a stem, counted in rings.
 struct StemProbe {
-  int on = 0;               ///< The stem.
-  int beside = 0;           ///< Something else at about the distance of the stem.
-  int through = 0;          ///< Nothing there: something behind it, or no return.
-  bool open_above = false;  ///< Beams pass where the stem should go on upwards.
-  bool open_below = false;  ///< The same downwards.
+  int on = 0;               ///< Hits on the stem.
+  int beside = 0;           ///< Hits on another object at about the distance of the stem.
+  int through = 0;          ///< Return from behind it, or no return.
+  bool open_above = false;  ///< Beams pass above it, where the stem should continue.
+  bool open_below = false;  ///< Likewise below it.
 };
 
-/// Looks at the stem as far as it was fitted, and between knee height and above a person's height,
-/// where every trunk must be. `ground_z`: below the stem, frame `vehicle_level` [m].
+/// Checks the stem over its fitted height, and between knee height and above a person's height,
+/// where every trunk must be visible. `ground_z`: below the stem, frame `vehicle_level` [m].
 StemProbe probe_stem(const rings::RingCloud& cloud, const StemFit& fit, double ground_z,
                      const SweepParameters& parameters);
 

@@ -6,9 +6,9 @@
 namespace understory::landmark_extractor::trunks {
 namespace {
 
-/// Beyond this (part of the radius) the range falls off too steeply for its derivative.
+/// Beyond this share of the radius the range changes too steeply for its derivative.
 constexpr float kMaxGraze = 0.98F;
-/// Residuals beyond this many sigma weigh as those at it (Huber).
+/// Residuals beyond this many sigma are weighted as at this limit (Huber).
 constexpr float kHuber = 2.0F;
 
 /// Residuals with their derivatives by (x, y, radius) at their own heights.
@@ -18,11 +18,11 @@ struct Terms {
   Lanes by_x;
   Lanes by_y;
   Lanes by_radius;
-  Lanes weight;  ///< 1 / variance, less where a beam grazes.
-  Lanes fade;    ///< By how much.
+  Lanes weight;  ///< 1 / variance, reduced for a grazing beam.
+  Lanes fade;    ///< That reduction.
 };
 
-/// Where beams meet the stem.
+/// Intersections of beams with the stem.
 [[gnu::always_inline]] inline void take_hits(const HitLanes& hits, const StemState& stem,
                                              const BeamNoise& noise, Terms& terms) {
   const std::array<float, 6> s = stem.values;
@@ -37,19 +37,20 @@ struct Terms {
     const float along = dx * to_x + dy * to_y;
     const float miss = dx * to_y - dy * to_x;
 
-    // The clamp keeps the root real where a beam misses the stem.
+    // The limit keeps the root real if a beam misses the stem.
     const float limit = kMaxGraze * radius;
     const float m = std::min(std::max(miss, -limit), limit);
     const float square = radius * radius - m * m;
     const float inverse = 1.0F / std::sqrt(square);
     const float tangent = m * inverse;
 
-    // A footprint of some width on a slanting surface smears the range.
+    // The width of the footprint on a slanting surface blurs the range.
     const float smear = tangent * along * noise.beam_width_rad;
     const float variance = noise.range_variance + smear * smear;
 
-    // Residuals count across the bark. Where the range falls off steeply only the edge itself says
-    // something; and what jumped in and out with the estimate would pull it inwards.
+    // Residuals are measured across the bark. At grazing incidence only the edge itself is
+    // informative; and beams that alternate between hit and miss during the iteration would pull
+    // the edge inwards.
     const float share = miss / radius;
     const float fade = std::max(1.0F - share * share, 0.0F);
 
@@ -64,7 +65,7 @@ struct Terms {
   }
 }
 
-/// How far lines of sight pass from the stem on their own side.
+/// Distances of lines of sight from the stem on their own side.
 [[gnu::always_inline]] inline void take_edges(const EdgeLanes& edges, const StemState& stem,
                                               Terms& terms) {
   const std::array<float, 6> s = stem.values;
@@ -226,7 +227,7 @@ void square_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edg
   square_all(hits, edges, stem, noise, hit_means, edge_squares);
 }
 
-/// Cholesky, with bounds that the compiler knows.
+/// Cholesky, with loop bounds known to the compiler.
 bool solve_normal(const Matrix6d& information, const Vector6d& gradient, Vector6d& change) {
   constexpr int kSize = 6;
   Matrix6d factor = Matrix6d::Zero();

@@ -8,27 +8,28 @@
 namespace understory::landmark_extractor::trunks {
 namespace {
 
-/// Anything so wide must not fit better to an upright plane.
+/// An object this wide must not fit an upright plane better.
 constexpr double kFlatWidth_m = 0.2;
-/// Anything not measured above this height is a stone, a stump, a tuft of grass.
+/// An object without returns above this height is a stone, a stump, a tuft of grass.
 constexpr double kStump_m = 0.6;
-/// Returns so near the fitted surface are on it [sigma].
+/// Returns within this distance of the fitted surface are on it [sigma].
 constexpr double kOnBark = 2.0;
 
-/// Runs of so many rings are of a stem rather than a bush.
+/// Runs of at least this number of rings belong to a stem rather than a bush.
 constexpr std::size_t kTall = 5;
-/// Largest share of lost beams that is believed.
+/// Upper limit of the share of lost beams.
 constexpr double kMostLost = 0.5;
 
-/// How far the centre of a stem that is not round is off. An oval that reaches farther towards the
-/// sensor by some length is narrower by as much on either side; so the radius, and where the centre
-/// is behind the front, miss it by twice that. Three-cornered ones shift both edges to one side.
+/// Error of the centre of a stem that is not round. An oval that extends towards the sensor by some
+/// length is narrower by the same length on either side; so the radius, and the distance of the
+/// centre behind the front, are wrong by twice that. Three-cornered ones shift both edges to one
+/// side.
 Eigen::Matrix2d from_shape(const Eigen::Vector2d& from_sensor_m, double wave_m) {
   const Eigen::Vector2d ray = from_sensor_m.normalized();
   return wave_m * wave_m * (Eigen::Matrix2d::Identity() + 3.0 * ray * ray.transpose());
 }
 
-/// The centre at breast height with its covariance, but for that of its shape.
+/// The centre at breast height with its covariance, without that of its shape.
 model::Detection to_detection(const StemFit& fit, const ground::GroundHeight& ground,
                               double breast_height, const Eigen::Matrix2d& level_covariance_rad2) {
   const double z = ground.height_m + breast_height;
@@ -50,8 +51,9 @@ model::Detection to_detection(const StemFit& fit, const ground::GroundHeight& gr
   return detection;
 }
 
-/// Probability that a beam without a return beside a run met the same object and was lost. Such
-/// beams show between the points of runs; at the edges are as many, among those that passed by.
+/// Probability that a beam without a return beside a run hit the same object and was lost. Such
+/// beams can be counted between the points of runs; at the edges there are as many, among those
+/// that passed by.
 double share_of_lost(const std::vector<rings::Run>& runs, const std::vector<Column>& columns) {
   double met = 0.0;
   double lost = 0.0;
@@ -104,7 +106,7 @@ std::optional<model::Detection> SweepTrunks::judge(const rings::RingCloud& cloud
                                                    const Column& column,
                                                    const ground::GroundSurface& ground,
                                                    const Eigen::Matrix2d& level_covariance_rad2) {
-  // Enough of it?
+  // Enough points and rings?
   const auto enough = [&](std::size_t points, std::size_t rings) {
     return points >= static_cast<std::size_t>(trunk_.min_points) &&
            rings >= static_cast<std::size_t>(trunk_.min_rings);
@@ -121,7 +123,7 @@ std::optional<model::Detection> SweepTrunks::judge(const rings::RingCloud& cloud
     return std::nullopt;
   }
 
-  // Of a trunk's shape, above the ground, and not in leaves?
+  // A trunk's shape, above the ground, and not in leaves?
   const ground::GroundHeight below = ground.below(fit->state.head<2>());
   if (!plausible(*fit, below.height_m + sweep_.breast_height_m)) return std::nullopt;
   if (fit->high_z_m < below.height_m + kStump_m) {
@@ -133,7 +135,7 @@ std::optional<model::Detection> SweepTrunks::judge(const rings::RingCloud& cloud
     return std::nullopt;
   }
 
-  // Certain enough, and within range?
+  // Accurate enough, and within range?
   model::Detection detection =
       to_detection(*fit, below, sweep_.breast_height_m, level_covariance_rad2);
   const Eigen::Vector2d from_sensor =
@@ -155,7 +157,7 @@ std::optional<model::Detection> SweepTrunks::judge(const rings::RingCloud& cloud
   return detection;
 }
 
-/// Below a crown: whether more returns are beside the stem than a trunk has. A run that goes on
+/// Below a crown: whether more returns are beside the stem than a trunk has. A run that continues
 /// along a branch has returns of both.
 bool SweepTrunks::is_in_leaves(const rings::RingCloud& cloud, const std::vector<rings::Run>& runs,
                                const StemFit& fit) {
@@ -181,7 +183,7 @@ bool SweepTrunks::is_in_leaves(const rings::RingCloud& cloud, const std::vector<
 bool SweepTrunks::plausible(const StemFit& fit, double breast_z) {
   const double radius = fit.radius_at(breast_z);
   const double radius_sigma = std::sqrt(fit.covariance(2, 2));
-  // Too thin only where it is thin beyond doubt.
+  // Too thin only if that is certain.
   if (radius + 2.0 * radius_sigma < trunk_.min_radius_m || radius > trunk_.max_radius_m) {
     ++counters_.wrong_radius;
     return false;

@@ -93,7 +93,7 @@ const std::vector<Column>& ColumnFinder::find(const std::vector<rings::Run>& run
   columns_.clear();
   fill_grid(runs, parameters);
 
-  // Each run is in one column at most, so spans of members_ stay valid.
+  // Each run is in at most one column, so spans of members_ stay valid.
   members_.clear();
   members_.reserve(order_.size());
   for (const std::uint64_t entry : order_) {

@@ -1,4 +1,4 @@
-// Gathers runs of several rings that are one above the other.
+// Groups runs of several rings that are one above the other.
 #pragma once
 
 #include <cstdint>
@@ -17,19 +17,19 @@ struct Column {
   std::size_t points = 0;                              ///< Of all its runs.
 };
 
-/// Finds columns in the plan by a grid of cells of 0.5 m. Keeps its memory from sweep to sweep, but
-/// no state.
+/// Finds columns in the plan with a grid of 0.5 m cells. Reuses memory between sweeps, but has no
+/// state.
 class ColumnFinder {
  public:
   /// The columns within `reach_m` of `centre_m`, valid until the next call. Greedy: the run with
-  /// most points first; each takes the free runs around its vertical, once more around their mean.
-  /// Runs wider than a trunk or with neighbours that touch them are left out.
+  /// most points first; each takes the free runs around its vertical, then again around their mean.
+  /// Runs wider than a trunk or with touching neighbours are excluded.
   const std::vector<Column>& find(const std::vector<rings::Run>& runs,
                                   const SweepTrunkParameters& parameters,
                                   const Eigen::Vector2f& centre_m, float reach_m);
 
-  /// Runs up to `highest_m` above ground whose centres are within the radius, whatever column they
-  /// are in; of the runs of the last find().
+  /// Runs of the last find() up to `highest_m` above ground with centres within the radius,
+  /// whatever their column.
   void runs_near(const std::vector<rings::Run>& runs, const Eigen::Vector2f& centre_m,
                  float radius_m, float highest_m, std::vector<std::uint32_t>& near) const;
 

@@ -11,17 +11,17 @@
 namespace understory::landmark_extractor::view {
 namespace {
 
-/// Of the returns of one bin [m]; 0 = none.
+/// The returns of one bin [m]; 0 = none.
 struct Met {
   double nearest_m = 0.0;
   double farthest_m = 0.0;
 };
 
-/// Bins from the right to the left, the first beam in the middle of the first one.
+/// Bins from right to left, the first beam in the middle of the first one.
 std::vector<Met> bins_of(const planar::Beams& scan) {
   const double first_rad = scan.beams.front().bearing_rad;
   const double width_rad = scan.beams.back().bearing_rad - first_rad;
-  // The first beam may come again as the last.
+  // The first beam may be repeated as the last.
   const double turn = 2.0 * std::numbers::pi / scan.step_rad + 1e-6;
   const double count = std::min(turn, std::floor(width_rad / scan.step_rad + 0.5) + 1.0);
 
@@ -36,8 +36,8 @@ std::vector<Met> bins_of(const planar::Beams& scan) {
   return bins;
 }
 
-/// Where the laser was at both ends of the bins: it moved evenly from return to return. A beam
-/// without one has no place.
+/// Positions of the laser at both ends of the bins: it moved at a constant rate between returns. A
+/// beam without return has no position.
 struct Ends {
   Eigen::Vector2d right_m;
   Eigen::Vector2d left_m;
@@ -55,7 +55,7 @@ Ends ends_of(const planar::Beams& scan, double width_rad) {
   return {right_m, right_m + width_rad * per_rad};
 }
 
-/// Whether later beams look farther to the left.
+/// Whether later beams are farther to the left.
 bool goes_leftward(const planar::Beams& scan) {
   const planar::Beam* before = nullptr;
   for (const planar::Beam& beam : scan.beams) {

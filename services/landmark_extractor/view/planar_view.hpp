@@ -1,4 +1,4 @@
-// How far a laser that scans one plane saw.
+// Range of view of a one-plane laser.
 #pragma once
 
 #include "common/model/view_ranges.hpp"
@@ -6,10 +6,10 @@
 
 namespace understory::landmark_extractor::view {
 
-/// A bin for each step from beam to beam, in order of time, from the first beam to the last; no
-/// bins where the step is not known. Of the returns of one bin the nearest is how far one sees, and
-/// from the farthest on all is hidden. A beam without a return says nothing. Ranges up to
-/// `range_m`. Stamp and number are left to the caller.
+/// A bin per beam step, in order of time, from the first beam to the last; no bins if the step is
+/// unknown. The nearest return of a bin gives the visible range, the farthest one the range from
+/// which everything is hidden. A beam without a return is ignored. Ranges up to `range_m`. The
+/// caller sets stamp and number.
 model::ViewRanges planar_view(const planar::Beams& scan, double range_m);
 
 }  // namespace understory::landmark_extractor::view

@@ -7,18 +7,18 @@
 
 namespace understory::landmark_extractor::view {
 
-/// Of the unit of ranges, as one byte has.
+/// Largest value of a byte, in units of range.
 inline constexpr double kMostSteps = 255.0;
 
 /// Unit with which ranges up to this fit into a byte [m].
 constexpr double step_for(double range_m) { return range_m / (kMostSteps - 1.0); }
 
-/// Never farther than it is.
+/// Rounded to a range that is not larger.
 inline std::uint8_t rounded_down(double range_m, double step_m) {
   return static_cast<std::uint8_t>(std::min(kMostSteps, std::floor(range_m / step_m)));
 }
 
-/// Never nearer than it is; 0 where it does not fit into a byte.
+/// Rounded to a range that is not smaller; 0 if it does not fit into a byte.
 inline std::uint8_t rounded_up(double range_m, double step_m) {
   const double steps = std::max(1.0, std::ceil(range_m / step_m));
   return steps > kMostSteps ? 0 : static_cast<std::uint8_t>(steps);

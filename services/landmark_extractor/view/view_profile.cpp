@@ -13,14 +13,14 @@ namespace {
 constexpr double kTurn = 2.0 * std::numbers::pi;
 /// Sectors all around: 0.5 degrees each.
 constexpr int kBins = 720;
-/// From here upwards a trunk must be seen where nothing hides it [m].
+/// Above this height a trunk must be visible unless it is occluded [m].
 constexpr double kFoot_m = 0.5;
-/// Beams that went so little farther than the last return did not pass it [m].
+/// A beam must exceed the last return by this to have passed it [m].
 constexpr float kPassed_m = 0.5F;
-/// No sensor looks so far [m].
+/// Beyond the range of any sensor [m].
 constexpr float kFarthest_m = 1e4F;
 
-/// Median of what the rings measured; 0 where none did.
+/// Median of the rings' measured steps; 0 if there are none.
 float beam_step(const rings::RingCloud& cloud, std::vector<float>& steps) {
   steps.clear();
   for (std::size_t ring = 0; ring < cloud.rings(); ++ring)
@@ -31,7 +31,7 @@ float beam_step(const rings::RingCloud& cloud, std::vector<float>& steps) {
   return *middle;
 }
 
-/// Where the revolution ended [rad], by a point of it; 0 where times are not known.
+/// Azimuth of the end of the revolution [rad], from one of its points; 0 if times are unknown.
 float last_azimuth(const rings::RingCloud& cloud, const points::RingPoint& point) {
   if (cloud.spin_radps() == 0.0F) return 0.0F;
   return points::wrap_angle_f(point.azimuth_rad - cloud.spin_radps() * point.time_s);
@@ -50,7 +50,7 @@ void ViewProfile::begin(const points::Levelling& levelling, const ground::Ground
   bins_ = {};
 }
 
-/// How far a beam with this return was between the heights: from where it leaves them [m].
+/// Distance that a beam with this return travelled between the heights: up to its exit [m].
 inline float ViewProfile::way_in_band(float range_m, float height_m) const {
   if (height_m > highest_m_) {
     if (sensor_m_ >= highest_m_) return 0.0F;
@@ -94,7 +94,7 @@ const model::ViewRanges& ViewProfile::finish(const model::PointSweep& sweep,
   return ranges_;
 }
 
-/// In order of time, where times are known.
+/// In order of time, if times are known.
 void ViewProfile::lay_bins(const rings::RingCloud& cloud, const points::RingPoint& point) {
   const double direction = cloud.spin_radps() < 0.0F ? -1.0 : 1.0;
   bins_ = {last_azimuth(cloud, point), static_cast<float>(direction / kTurn), kBins};
@@ -112,7 +112,7 @@ void ViewProfile::describe_bins(const rings::RingCloud& cloud) {
   ranges_.range_step_m = step_for(static_cast<double>(range_m_));
 }
 
-/// The ground under where beams leave the range.
+/// The ground below the beams at the range limit.
 void ViewProfile::find_far_ground(const points::Levelling& levelling,
                                   const ground::GroundSurface& ground) {
   constexpr std::size_t kLanes = 8;
@@ -133,7 +133,7 @@ void ViewProfile::find_far_ground(const points::Levelling& levelling,
   for (float& height : heights) height = -height;
 }
 
-/// Returns beyond the range, which the rings do not have: how far their beams were free.
+/// Returns beyond the range, which are not in the rings: free distance of their beams.
 void ViewProfile::take_far(const rings::RingCloud& cloud, const points::Levelling& levelling) {
   const float sensor = levelling.sensor_m.z();
   const float climb = levelling.velocity_mps.z();

@@ -1,4 +1,4 @@
-// How far a sweep saw at the height of trunks, all around.
+// Range of view of a sweep at the height of trunks, in all directions.
 #pragma once
 
 #include <cstdint>
@@ -12,32 +12,31 @@
 
 namespace understory::landmark_extractor::view {
 
-/// Beams at heights where every trunk must be (knee height to above a person's) say how far one can
-/// see there. A beam is followed at the height above ground that lies between the sensor's and its
-/// return's in proportion to the range: exact over ground that is a plane from here to there. A
-/// beam without a return says nothing. Keeps its memory from sweep to sweep, but no state. Call
-/// begin(), take_ring() for each ring, finish().
+/// Beams at heights where every trunk must be visible (knee height to above a person's) give the
+/// range of view there. A beam's height above ground is interpolated linearly in range between the
+/// sensor's and its return's: exact over plane ground. A beam without a return is ignored. Reuses
+/// memory between sweeps, but has no state. Call begin(), take_ring() for each ring, finish().
 class ViewProfile {
  public:
-  /// A sweep. `levelling.max_range_m`: as far as its rings go.
+  /// Begins a sweep. `levelling.max_range_m`: range limit of its rings.
   void begin(const points::Levelling& levelling, const ground::GroundSurface& ground,
              const SweepParameters& parameters);
-  /// One ring of it that is in order: while its points are in the cache.
+  /// Adds one sorted ring, while its points are in the cache.
   void take_ring(const rings::RingCloud& cloud, std::size_t ring);
-  /// Ranges by all rings, and by what is farther; no bins where the sweep has no rings to measure
-  /// by.
+  /// Ranges from all rings and from points beyond their range; no bins if no ring has a measured
+  /// step.
   const model::ViewRanges& finish(const model::PointSweep& sweep, const rings::RingCloud& cloud,
                                   const points::Levelling& levelling,
                                   const ground::GroundSurface& ground);
 
  private:
-  /// A sector of bearings while returns come in [m].
+  /// A sector of bearings during accumulation [m].
   struct Sector {
-    float seen_m = 0.0F;      ///< As far as a beam came between the heights.
+    float seen_m = 0.0F;      ///< Range that a beam reached between the heights.
     float nearest_m = 0.0F;   ///< Of the returns between them; 0 = none.
     float farthest_m = 0.0F;  ///< Likewise.
   };
-  /// Which bin a bearing is in.
+  /// The bin of a bearing.
   struct Bins {
     float first_rad = 0.0F;
     float turns_per_rad = 0.0F;  ///< Negative = to the right.
@@ -63,9 +62,9 @@ class ViewProfile {
   float lowest_m_ = 0.0F;   ///< Above ground.
   float highest_m_ = 0.0F;  ///< Likewise.
   float sensor_m_ = 0.0F;   ///< Likewise.
-  float range_m_ = 0.0F;    ///< What is farther counts as that far.
+  float range_m_ = 0.0F;    ///< Ranges beyond this are set to it.
   std::vector<Sector> sectors_;
-  std::vector<float> far_ground_m_;  ///< Of each bin at `range_m_`, frame `vehicle_level`.
+  std::vector<float> far_ground_m_;  ///< Per bin at `range_m_`, frame `vehicle_level`.
   std::vector<float> steps_;
   model::ViewRanges ranges_;
 };
