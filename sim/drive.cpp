@@ -34,7 +34,7 @@ bool inside(const Forest& forest, const Eigen::Vector2d& p, double margin_m) {
          ((forest.high_m - p).array() >= margin_m).all();
 }
 
-/// The path, densely enough that a disc around each point covers the distance to the next.
+/// The path, so dense that a disc around each point covers the distance to the next.
 bool fits(const Forest& forest, const PointGrid& grid, const std::vector<geometry::SE2>& path,
           const geometry::SE2& start, const StartPoseParameters& parameters) {
   for (const geometry::SE2& pose : path) {
@@ -62,7 +62,7 @@ bool is_in_sector(const Eigen::Vector2d& position_m, const SensorParameters& sen
   return std::abs(std::atan2(position_m.y(), position_m.x())) <= 0.5 * sensor.view_rad;
 }
 
-/// How far shared errors move a trunk from outside into range: 6 sigma.
+/// Largest displacement of a trunk by shared errors: 6 sigma.
 double shared_reach_m(const SensorParameters& sensor, const SharedErrorParameters& p) {
   const double sigma_m = std::hypot(p.along_sigma_m, p.direction_sigma_m,
                                     std::abs(p.level_height_m) * p.level_sigma_rad);

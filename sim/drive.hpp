@@ -1,4 +1,4 @@
-// A simulated drive: a forest, a path in it, what the robot observes on it, and the truth.
+// A simulated drive: a forest, a path in it, the robot's observations, and the truth.
 #pragma once
 
 #include <cstdint>
@@ -24,14 +24,15 @@ struct SensorParameters {
   double range_m = 40.0;
   double detection_probability = 0.9;  ///< [kappa] Of every landmark in range, independently.
   double position_sigma_m = 0.2;       ///< [epsilon] Per axis: independent.
-  double stated_factor = 1.0;  ///< Stated sigma by the true one: no deployment knows the true one.
-  /// Least variance that a detection states [m^2]: a noise-free one must not be infinitely sure.
+  double stated_factor =
+      1.0;  ///< Stated sigma divided by the true one: in practice the true one is unknown.
+  /// Least stated variance of a detection [m^2]: also without noise it must not be zero.
   double variance_floor_m2 = 1e-8;
-  double view_rad = 2.0 * std::numbers::pi;  ///< Width of the field of view, its middle ahead.
-  SharedErrorParameters shared;  ///< Errors on top, which scans share; what is stated counts none.
+  double view_rad = 2.0 * std::numbers::pi;  ///< Width of the field of view, centred ahead.
+  SharedErrorParameters shared;  ///< Additional errors common to several scans; not included in the
+                                 ///< stated covariance.
 
-  /// Farther landmarks are never detected: noise brings some from outside into range, 6 sigma are
-  /// enough.
+  /// Farther landmarks are never detected: noise moves some from outside into range, up to 6 sigma.
   double reach_m() const { return range_m + 6.0 * position_sigma_m; }
 };
 
@@ -42,65 +43,66 @@ struct WheelOdometryParameters {
   double turn_share = 0.02;      ///< Of a rotation, as a share of it.
 };
 
-/// One scan with the truth that a mapper must not get.
+/// One scan with truth that the mapper must not get.
 struct SimulatedScan {
   model::LandmarkScan scan;
   geometry::SE2 world_T_vehicle;
-  std::vector<std::uint32_t> trunks;  ///< Index of the trunk behind each detection.
+  std::vector<std::uint32_t> trunks;  ///< Index of the trunk of each detection.
 };
 
-/// The errors that scans of a drive share, at one of them.
+/// The shared errors of a drive, at one scan.
 struct SharedErrorsAt {
-  const SharedErrors* errors = nullptr;  ///< None where it is null.
-  double along_m = 0.0;                  ///< Travelled up to the scan.
+  const SharedErrors* errors = nullptr;  ///< Null: none.
+  double along_m = 0.0;                  ///< Distance travelled up to the scan.
 };
 
-/// All trunks in range of the pose, each detected by chance, its position noisy; the noise comes
-/// before the test of the field of view (as in the code published with GeoSLAM). In random order.
+/// All trunks in range of the pose, each detected at random, with a noisy position; the noise is
+/// added before the test of the field of view (as in the code published with GeoSLAM). In random
+/// order.
 SimulatedScan observe(const Forest& forest, const PointGrid& grid,
                       const geometry::SE2& world_T_vehicle, const SensorParameters& sensor,
                       std::mt19937_64& random, const SharedErrorsAt& shared = {});
 
-/// What a start pose has to keep clear of.
+/// Requirements on a start pose.
 struct StartPoseParameters {
-  double clearance_m = 0.3;  ///< No trunk nearer than this to the path.
+  double clearance_m = 0.3;  ///< Least distance of trunks from the path.
   double margin_m = 40.0;    ///< Of forest around the whole path.
   int tries = 20000;
 };
-/// A start pose in the central half of the forest, heading uniform, from which the path
-/// (vehicle poses in the frame of the first) keeps clear of all trunks and inside the forest.
-/// None if no try succeeded.
+/// A start pose in the central half of the forest, with uniform heading, for which the path
+/// (vehicle poses in the frame of the first) is free of trunks and inside the forest. None if all
+/// tries failed.
 std::optional<geometry::SE2> draw_start_pose(const Forest& forest, const PointGrid& grid,
                                              const std::vector<geometry::SE2>& path,
                                              const StartPoseParameters& parameters,
                                              std::mt19937_64& random);
 
-/// Everything of a simulated drive but its seed.
+/// All parameters of a simulated drive except its seed.
 struct DriveParameters {
   ForestParameters forest;
   PathParameters path;
   SensorParameters sensor;
   StartPoseParameters start;
-  double speed_mps = 1.0;  ///< Gives the stamps: interval / speed between scans.
-  /// Trunks too near to the path are felled instead of another start being drawn: a long path
-  /// always meets some. The forest then also grows to hold the path.
+  double speed_mps = 1.0;  ///< Determines the stamps: interval / speed between scans.
+  /// Trunks too near to the path are felled instead of drawing another start: a long path always
+  /// meets some. The forest is then also enlarged to contain the path.
   bool clear_the_path = false;
-  /// The forest is thinned until scans have so many trunks in view on average, before chance takes
-  /// some; 0 = as it is.
+  /// The forest is thinned until scans have this number of trunks in view on average, before random
+  /// misses; 0 = not thinned.
   double trunks_in_view = 0.0;
   WheelOdometryParameters wheels;
 };
 
-/// A laser with one plane that looks ahead and sees trunks up to 20 m, two or three in a scan of
-/// every metre, each with 3 cm of noise.
+/// A one-plane laser that looks ahead and sees trunks up to 20 m, two or three per scan, one scan
+/// per metre, with 3 cm of noise each.
 DriveParameters few_landmarks_drive();
 
-/// Scans are made when asked for, each from a stream of its own: a drive of any length costs no
-/// memory, and scan k is the same whichever were asked for before.
+/// Scans are computed on request, each from its own random stream: a drive of any length needs no
+/// memory, and scan k does not depend on earlier calls.
 class Drive {
  public:
-  /// A forest, a path and a start pose from `seed`. Throws std::runtime_error where the path fits
-  /// nowhere.
+  /// A forest, a path and a start pose from `seed`. Throws std::runtime_error if the path does not
+  /// fit.
   Drive(const DriveParameters& parameters, std::uint64_t seed);
   /// The same in a given forest (`parameters.forest` is not used).
   Drive(const DriveParameters& parameters, Forest forest, std::uint64_t seed);
@@ -109,13 +111,13 @@ class Drive {
   std::size_t size() const { return world_T_vehicle_.size(); }
   /// Scan k with its truth; the same at every call. Precondition: k < size().
   SimulatedScan scan(std::size_t k) const;
-  /// What wheels measure from scan k - 1 to scan k; the same at every call. Precondition: 0 < k <
+  /// Wheel measurement from scan k - 1 to scan k; the same at every call. Precondition: 0 < k <
   /// size().
   model::Odometry odometry(std::size_t k) const;
   /// Stamp of scan k [us].
   model::Utime utime(std::size_t k) const;
 
-  /// The forest driven through, felled trunks left out.
+  /// The forest of the drive, without felled trunks.
   const Forest& forest() const { return forest_; }
   /// The forest's trunks, for queries by position.
   const PointGrid& grid() const { return *grid_; }
@@ -123,10 +125,10 @@ class Drive {
   const std::vector<geometry::SE2>& world_T_vehicle() const { return world_T_vehicle_; }
   /// Distance travelled up to scan k [m].
   double along_m(std::size_t k) const { return along_m_[k]; }
-  /// Distance from the sensor within which a trunk may be detected [m]: errors move some into
+  /// Largest distance from the sensor of a trunk that may be detected [m]: errors move some into
   /// range.
   double reach_m() const;
-  /// The parameters in force (the forest may have grown to hold the path).
+  /// The parameters in use (the forest may have been enlarged for the path).
   const DriveParameters& parameters() const { return parameters_; }
 
  private:

@@ -14,7 +14,7 @@ namespace {
 constexpr double kThinningTileM = 10.0;
 /// Halvings of the spacing's bracket: to a hundredth of the range.
 constexpr int kHalvings = 12;
-/// A pose in so many is enough for the mean.
+/// Number of poses that is sufficient for the mean.
 constexpr std::size_t kMostPoses = 400;
 
 std::vector<geometry::SE2> some_of(std::span<const geometry::SE2> poses) {

@@ -1,4 +1,4 @@
-// Forests thinned so that scans show few trunks.
+// Thinned forests, with few trunks per scan.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,16 @@
 
 namespace understory::sim {
 
-/// The forest without trunks that stand nearer than `spacing_m` to one that is left; which of two
-/// is left is drawn. Cost: the neighbours within `spacing_m` of all trunks.
+/// The forest without trunks nearer than `spacing_m` to a remaining one; which of two remains is
+/// random. Cost: the neighbours within `spacing_m` of all trunks.
 Forest thinned(const Forest& forest, double spacing_m, std::uint64_t seed);
 
 /// Mean number of trunks in view of the poses (world_T_vehicle); 0 without poses.
 double mean_in_view(const Forest& forest, std::span<const geometry::SE2> poses,
                     const model::FieldOfView& view);
 
-/// The forest thinned by the spacing at which the poses have `wanted` trunks in view on average,
-/// about; as it is where it has no more than those.
+/// The forest thinned by the spacing at which the poses have about `wanted` trunks in view on
+/// average; unchanged if it has no more than that.
 Forest thinned_to(double wanted, const Forest& forest, std::span<const geometry::SE2> poses,
                   const model::FieldOfView& view, std::uint64_t seed);
 

@@ -21,7 +21,7 @@ std::size_t node(int column, int row) {
   return static_cast<std::size_t>(row & (kCells - 1)) * kCells + (column & (kCells - 1));
 }
 
-/// Metres along the ray to where it leaves the block of `position` (in cells, positive).
+/// Distance along the ray to the border of the block of `position` (in cells, positive).
 double to_border(double position, double per_metre, double inverse) {
   if (per_metre == 0.0) return std::numeric_limits<double>::infinity();
   const int low = static_cast<int>(position) & ~(kBlockCells - 1);
@@ -57,7 +57,7 @@ void Ground::add_waves(int count, double min_length_m, double max_length_m, doub
     waves_.push_back({2.0 * std::numbers::pi / kTile * turns, angle(random), length_m});
   }
 
-  // Waves of one length and direction add up or cancel: the sum is measured.
+  // Waves of one length and direction may add up or cancel: their sum is measured.
   const Ground waves_alone(
       std::vector<Wave>(waves_.begin() + static_cast<std::ptrdiff_t>(first), waves_.end()));
   double squares = 0.0;
@@ -70,7 +70,7 @@ void Ground::add_waves(int count, double min_length_m, double max_length_m, doub
 void Ground::fill_table() {
   table_.assign(static_cast<std::size_t>(kCells) * kCells, 0.0F);
   for (const Wave& wave : waves_) {
-    // Along a row the phase advances by the same angle from node to node: no sine for each.
+    // Along a row the phase advances by the same angle per node: no sine for each.
     const std::complex<double> step = std::polar(1.0, kCell * wave.wave_vector.x());
     for (int row = 0; row < kCells; ++row) {
       const double start = kCell * row * wave.wave_vector.y() + wave.phase_rad;
@@ -131,9 +131,9 @@ Eigen::Vector3d Ground::normal(const Eigen::Vector2d& at_m) const {
   return Eigen::Vector3d(-g.x(), -g.y(), 1.0).normalized();
 }
 
-/// A ray over the table: everything in cells, heights above the plane.
+/// A ray over the table: all in cells, heights above the plane.
 struct Ground::Track {
-  // Far from zero, so that positions are positive and truncation rounds down.
+  // A large offset keeps positions positive, so that truncation rounds down.
   static constexpr double kShift = 4096.0 * kCells;
   double u0, v0, z0;     ///< Start.
   double du, dv, climb;  ///< Per metre of the ray.
@@ -151,7 +151,7 @@ struct Ground::Track {
   double z(double t) const { return z0 + climb * t; }
 };
 
-/// The corners of the cell at (u, v), and the place in it.
+/// The corners of the cell at (u, v), and the position in it.
 struct Ground::Cell {
   double a, b;  ///< In [0, 1).
   double low_left, low_right, high_left, high_right;
@@ -209,7 +209,7 @@ std::optional<GroundHit> Ground::cast(const Eigen::Vector3d& origin_m,
     const double u = track.u(t);
     const double v = track.v(t);
 
-    // A hair beyond the border, to be in the next block.
+    // Slightly beyond the border, into the next block.
     const double border =
         t + 1e-6 + std::min(to_border(u, track.du, u_inverse), to_border(v, track.dv, v_inverse));
     const Block& block = block_at(u, v);
@@ -226,7 +226,7 @@ std::optional<GroundHit> Ground::cast(const Eigen::Vector3d& origin_m,
     const double after = track.z(next) - Cell(table_, track.u(next), track.v(next)).height();
 
     if (after <= 0.0) {
-      // Straight between the two: the cells are larger than the least step.
+      // Linear between the two: the cells are larger than the least step.
       const double crossing = t + (next - t) * clearance / (clearance - after);
       if (crossing >= max_m) return std::nullopt;
       return hit_at(track, crossing, direction);

@@ -8,7 +8,7 @@
 
 namespace understory::sim {
 
-/// The shape of the ground and what covers it.
+/// Shape and cover of the ground.
 struct GroundParameters {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< Rise per metre along x and y.
   double relief_m = 0.0;     ///< Standard deviation of hills with wavelengths of 25-130 m.
@@ -16,14 +16,14 @@ struct GroundParameters {
   double cover_m = 0.0;      ///< Mean height at which grass or leaves stop a ray.
 };
 
-/// Where a ray meets the ground.
+/// Intersection of a ray with the ground.
 struct GroundHit {
   double range_m = 0.0;
   double cosine = 1.0;       ///< Of the angle between the ray and the ground's normal.
-  double closing_m_m = 1.0;  ///< Height above the ground that the ray loses there per metre.
+  double closing_m_m = 1.0;  ///< Loss of height above the ground per metre of the ray at the hit.
 };
 
-/// A plane with waves on it, which repeat every 256 m. Smooth: all derivatives exist.
+/// A plane plus waves, periodic with 256 m. Smooth: all derivatives exist.
 class Ground {
  public:
   /// Level, at height 0.
@@ -40,9 +40,9 @@ class Ground {
   /// Mean height of the cover (grass, leaves).
   double cover_m() const { return cover_m_; }
 
-  /// Where the ray (unit direction) meets the ground within `max_m`. Uses a table with cells
-  /// of 0.5 m, within 5 mm of `height`; a bump that the ray grazes for less than 0.25 m may be
-  /// missed. At 0 where the ray starts below the ground.
+  /// Intersection of the ray (unit direction) with the ground within `max_m`. Uses a table with
+  /// cells of 0.5 m, within 5 mm of `height`; a bump that the ray grazes for less than 0.25 m may
+  /// be missed. At 0 if the ray starts below the ground.
   std::optional<GroundHit> cast(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
                                 double max_m) const;
 

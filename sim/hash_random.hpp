@@ -1,5 +1,5 @@
-// Chance without a state: numbers that depend on keys alone, so that the fate of a ray does not
-// depend on the rays cast before it.
+// Stateless random numbers that depend on keys alone, so that a ray's result does not depend on
+// rays cast earlier.
 #pragma once
 
 #include <cmath>

@@ -13,7 +13,7 @@ constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 Eigen::Matrix2d rotation(double angle) { return geometry::SE2(0.0, 0.0, angle).rotation(); }
 
-/// Adds one IMU sample: rate and force held over `dt`, the force in the frame at mid-rotation.
+/// Adds one IMU sample: constant rate and force over `dt`, the force in the frame at mid-rotation.
 void integrate(model::Preintegration& p, double rate, const Eigen::Vector2d& force, double dt,
                double gyro_noise, double accelerometer_noise) {
   const double yaw = rate * dt;
@@ -111,7 +111,8 @@ Eigen::Vector2d InertialDrive::sway_velocity() {
   return {x, parameters_.sway_sigma_mps * normal()};
 }
 
-/// Accelerations by which the body reaches a new place and velocity of its sway at the next scan.
+/// Accelerations that bring the body to a new random position and velocity of its sway at the next
+/// scan.
 void InertialDrive::begin_sway() {
   const geometry::SE2 next = sway_place();
   const Eigen::Vector2d velocity = sway_velocity();
@@ -140,7 +141,7 @@ InertialDrive::Tick InertialDrive::advance(double dt) {
   const InertialDriveParameters& p = parameters_;
   progress_.time_s += dt;
 
-  // The speed follows the wanted one as far as the acceleration allows.
+  // The speed follows its target within the acceleration limit.
   const double moving = progress_.time_s - p.stationary_s;
   const double wanted =
       moving <= 0.0 ? 0.0 : p.speed_mps * (1.0 + p.speed_swing * std::sin(0.4 * moving));
@@ -195,7 +196,7 @@ model::Odometry InertialDrive::drive_increment() {
   const model::Preintegration inertial = drive_samples(p.scan_interval_s / p.samples_per_scan);
   const geometry::SE2 truth = before.inverse() * body_.pose();
 
-  // How well the sensors on board measure the increment.
+  // Accuracy of the increment with the sensors on board.
   const bool wheels = p.odometry != OdometryKind::kInertial;
   const bool imu = p.odometry != OdometryKind::kWheels;
   const double sigma = wheels ? p.wheel_sigma_m : p.dead_reckoning_sigma_mps * p.scan_interval_s;
@@ -208,7 +209,7 @@ model::Odometry InertialDrive::drive_increment() {
   increment.has_wheels = wheels;
   if (imu) increment.inertial = inertial;
 
-  // Its error; stationary wheels measure none.
+  // Its error; stationary wheels have none.
   const double moved = increment.is_stationary && wheels ? 0.0 : p.true_noise_factor;
   const Eigen::Vector3d error(sigma * moved * normal(), sigma * moved * normal(),
                               imu ? 0.0 : rotation_sigma * moved * normal());

@@ -1,5 +1,5 @@
-// A smooth drive through trunks with inertial and wheel odometry, scan by scan: what the front
-// end's filters take, without sweeps.
+// A smooth drive through trunks with inertial and wheel odometry, scan by scan: input of the front
+// end's filters, without sweeps.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace understory::sim {
 
-/// Trunks that several drives share.
+/// Trunks used by several drives.
 struct TrunkField {
   Forest forest;
   std::unique_ptr<PointGrid> grid;
@@ -23,7 +23,7 @@ struct TrunkField {
 /// A forest drawn from `seed`, with its grid.
 TrunkField make_trunk_field(const ForestParameters& parameters, std::uint64_t seed);
 
-/// Where the odometry of an InertialDrive comes from.
+/// Sources of the odometry of an InertialDrive.
 enum class OdometryKind {
   kInertial,           ///< IMU only.
   kWheels,             ///< Wheels only.
@@ -39,38 +39,38 @@ struct InertialDriveParameters {
   double sway_sigma_rad = 0.0;
   double sway_sigma_mps = 0.0;  ///< Per axis.
   double speed_mps = 5.0;
-  double speed_swing = 0.2;        ///< Speed goes up and down by this share of it.
-  double acceleration_mps2 = 1.5;  ///< At most, while starting.
-  double loop_length_m = 1200.0;   ///< The path goes round and round, to the left.
-  double wiggle_curvature = 0.03;  ///< [1/m] Of the bends on it.
-  double wiggle_length_m = 60.0;   ///< From bend to bend of the same side.
+  double speed_swing = 0.2;        ///< Share by which the speed varies.
+  double acceleration_mps2 = 1.5;  ///< Largest, at the start.
+  double loop_length_m = 1200.0;   ///< The path repeats a loop to the left.
+  double wiggle_curvature = 0.03;  ///< [1/m] Of its bends.
+  double wiggle_length_m = 60.0;   ///< Between bends to the same side.
   double scan_interval_s = 0.1;
   int samples_per_scan = 10;  ///< Of the IMU.
   OdometryKind odometry = OdometryKind::kInertial;
   double gyro_noise = 2e-4;                ///< [rad/s/sqrt(Hz)]
-  double accelerometer_noise = 5e-3;       ///< [m/s^2/sqrt(Hz)] The level's noise included.
+  double accelerometer_noise = 5e-3;       ///< [m/s^2/sqrt(Hz)] Including the level's noise.
   double gyro_bias_sigma = 2e-3;           ///< [rad/s]
   double accelerometer_bias_sigma = 0.05;  ///< [m/s^2]
   double gyro_walk = 1e-5;                 ///< [rad/s/sqrt(s)]
   double accelerometer_walk = 1e-3;        ///< [m/s^2/sqrt(s)]
   double wheel_sigma_m = 0.01;             ///< Per axis of an increment's translation.
   double wheel_sigma_rad = 0.002;          ///< Of an increment's rotation, without an IMU.
-  double dead_reckoning_sigma_mps =
-      0.3;  ///< Of `from_T_to` where nothing but the IMU is behind it.
+  double dead_reckoning_sigma_mps = 0.3;   ///< Of `from_T_to` from an IMU alone.
   double range_m = 40.0;
   double detection_probability = 0.9;  ///< Of every trunk in range, independently.
   double position_sigma_m = 0.1;       ///< Per axis.
   double clutter_share = 0.0;          ///< False detections, as a share of the true ones expected.
-  /// True noise of IMU, wheels and detections, in units of that above, which the messages state.
+  /// True noise of IMU, wheels and detections, relative to the values above, which the messages
+  /// state.
   double true_noise_factor = 1.0;
-  SharedErrorParameters shared;  ///< Errors of trunks on top, which no message states.
+  SharedErrorParameters shared;  ///< Additional errors of trunks that no message states.
 };
 
-/// Everything between two scans, and the scan.
+/// Data between two scans, and the scan.
 struct DriveStep {
   std::vector<model::Odometry> odometry;  ///< Ends at the scan.
   model::LandmarkScan scan;
-  std::vector<std::int64_t> trunks;  ///< Behind each detection; -1 = clutter.
+  std::vector<std::int64_t> trunks;  ///< Of each detection; -1 = clutter.
   geometry::SE2 world_T_vehicle;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame world.
   double rate_rad_s = 0.0;
@@ -78,9 +78,8 @@ struct DriveStep {
   double driven_m = 0.0;
 };
 
-/// Made step by step, so a drive of any length costs no memory. The IMU's truth is integrated as
-/// `Preintegration` integrates its samples: the odometry carries noise and biases and no other
-/// error.
+/// Computed step by step, so a drive of any length needs no memory. The IMU's truth is integrated
+/// like the samples in `Preintegration`: the odometry has noise and biases and no other error.
 class InertialDrive {
  public:
   /// `world` must outlive the drive.
@@ -95,7 +94,7 @@ class InertialDrive {
     double yaw_rad = 0.0;
     Eigen::Vector2d acceleration_mps2 = Eigen::Vector2d::Zero();  ///< Frame body at mid-rotation.
   };
-  /// Where the vehicle is and how fast, frame world.
+  /// Pose and velocity of the vehicle, frame world.
   struct Body {
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
     double theta_rad = 0.0;
@@ -103,10 +102,10 @@ class InertialDrive {
     double rate_rad_s = 0.0;
 
     geometry::SE2 pose() const { return {position_m, theta_rad}; }
-    /// Rotates by `yaw_rad` within `dt`, at the end of which it has this velocity.
+    /// Rotates by `yaw_rad` within `dt`; the velocity at its end is `velocity_mps_after`.
     Tick move(double dt, double yaw_rad, const Eigen::Vector2d& velocity_mps_after);
   };
-  /// How far along the loop the vehicle is.
+  /// Progress of the vehicle along the loop.
   struct Progress {
     double time_s = 0.0;
     double speed_mps = 0.0;

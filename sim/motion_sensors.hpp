@@ -15,7 +15,7 @@
 
 namespace understory::sim {
 
-inline constexpr double kGravity = 9.81;  ///< [m/s^2], as common/model/imu.hpp has it.
+inline constexpr double kGravity = 9.81;  ///< [m/s^2], equal to common/model/imu.hpp.
 
 /// Rate and errors of an inertial unit.
 struct ImuParameters {
@@ -26,20 +26,20 @@ struct ImuParameters {
   double accelerometer_noise = 2e-3;       ///< White [m/s^2/sqrt(Hz)].
   double accelerometer_bias_sigma = 0.03;  ///< [m/s^2]
   double accelerometer_bias_walk = 1e-4;   ///< [m/s^2/sqrt(s)]
-  double scale_sigma = 5e-4;               ///< Of the error of each axis' scale.
-  double gyro_limit_rad_s = 0.0;           ///< Saturates here; 0 = never.
-  double accelerometer_limit_mps2 = 0.0;   ///< Saturates here; 0 = never.
+  double scale_sigma = 5e-4;               ///< Of the scale error of each axis.
+  double gyro_limit_rad_s = 0.0;           ///< Saturation; 0 = never.
+  double accelerometer_limit_mps2 = 0.0;   ///< Saturation; 0 = never.
   Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(1.0, 0.0, 0.6));
 
   /// Without any error.
   static ImuParameters perfect();
 };
 
-/// What an inertial unit feels, free of error: frame `sensor`, at the sensor's place.
+/// Measurement of an ideal inertial unit: frame `sensor`, at the sensor's position.
 model::ImuSample true_imu_sample(const VehicleState& state,
                                  const Eigen::Isometry3d& vehicle_T_sensor);
 
-/// Errors come one after another: samples are made in order.
+/// Errors are correlated in time: samples are made in order.
 class SimulatedImu {
  public:
   /// Draws biases and scales from `seed`.
@@ -52,7 +52,7 @@ class SimulatedImu {
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< Of the last sample [rad/s].
   /// Of the last sample [m/s^2].
   const Eigen::Vector3d& accelerometer_bias() const { return accelerometer_bias_; }
-  /// As given to the constructor.
+  /// The parameters of the constructor.
   const ImuParameters& parameters() const { return parameters_; }
 
  private:
@@ -78,7 +78,7 @@ struct WheelParameters {
   double encoder_left_m = 0.0;  ///< The wheel with the encoder, left of the rear axle's middle.
 };
 
-/// Errors come one after another: samples are made in order.
+/// Errors are correlated in time: samples are made in order.
 class SimulatedWheels {
  public:
   /// Draws scale and offset from `seed`.
@@ -101,7 +101,7 @@ class SimulatedWheels {
 struct GnssParameters {
   double rate_hz = 2.0;
   double sigma_m = 0.5;              ///< White, per axis.
-  double drift_sigma_m = 0.5;        ///< Of a slow error (Gauss-Markov) besides, per axis.
+  double drift_sigma_m = 0.5;        ///< Of an additional slow error (Gauss-Markov), per axis.
   double drift_time_s = 120.0;       ///< Its correlation time.
   double velocity_sigma_mps = 0.05;  ///< Per axis.
   /// No fix from `from_s` to `to_s` of the drive.
@@ -113,7 +113,7 @@ struct GnssParameters {
   Eigen::Vector3d antenna_m = {0.5, 0.0, 1.6};  ///< Frame `vehicle`.
 };
 
-/// Errors come one after another: fixes are made in order.
+/// Errors are correlated in time: fixes are made in order.
 class SimulatedGnss {
  public:
   /// Draws the slow error's start from `seed`.

@@ -21,7 +21,7 @@ constexpr std::array<std::pair<PathKind, std::string_view>, 8> kPathNames{
      {PathKind::kMeander, "meander"},
      {PathKind::kStationary, "stationary"}}};
 
-/// A stretch with constant twist: `effort` is what it costs in metres or radians.
+/// A stretch with constant twist: `effort` is its cost in metres or radians.
 struct Segment {
   double effort = 0.0;
   Eigen::Vector3d twist = Eigen::Vector3d::Zero();  ///< Per unit of effort.

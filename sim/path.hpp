@@ -1,4 +1,4 @@
-// The paths that the simulated robot drives (GeoSLAM §4.5.3, Fig. 4.7).
+// The paths of the simulated robot (GeoSLAM §4.5.3, Fig. 4.7).
 #pragma once
 
 #include <optional>
@@ -17,7 +17,7 @@ enum class PathKind {
   kFigureEight,   ///< A left circle, then a right one, each of half the length.
   kSquare,        ///< Rotations to the left on the spot by 90 degrees.
   kTriangle,      ///< Rotations to the left on the spot by 120 degrees.
-  kDoubleCircle,  ///< Two rounds to the right: what GeoSLAM's code drove as its figure-eight.
+  kDoubleCircle,  ///< Two rounds to the right: the figure-eight of GeoSLAM's code.
   kMeander,       ///< Parallel lanes in alternating directions, for long drives in a small forest.
   kStationary,    ///< Stationary; an observation at every interval of the length.
 };
@@ -31,16 +31,16 @@ struct PathParameters {
   double lane_spacing_m = 60.0;  ///< Meander only.
 };
 
-/// The name that path_kind() takes.
+/// The name accepted by path_kind().
 std::string_view to_string(PathKind kind);
 /// By name, e.g. "figure-eight"; none for another.
 std::optional<PathKind> path_kind(std::string_view name);
-/// All names that path_kind() takes.
+/// All names accepted by path_kind().
 std::vector<std::string> path_names();
 
-/// The poses of the vehicle (x forward) in the frame of the first, at every observation. A step
-/// that reaches a corner spends what is left of it rotating, metres as radians, and vice versa.
-/// The path ends where its length is driven, with no last rotation and no observation there.
+/// The poses of the vehicle (x forward) in the frame of the first, at every observation. At a
+/// corner the rest of a step is used for rotation, metres as radians, and vice versa. The path ends
+/// when its length is driven, without a last rotation and an observation there.
 std::vector<geometry::SE2> make_path(const PathParameters& parameters);
 
 }  // namespace understory::sim

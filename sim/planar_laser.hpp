@@ -1,4 +1,4 @@
-// A laser scanner with one plane.
+// A one-plane laser scanner.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,15 +13,14 @@
 
 namespace understory::sim {
 
-/// Beams of the SICK LMS of Victoria Park, on a head that turns as slowly as it scans: half a turn
-/// takes 50 ms, in which a car at 5 m/s moves by 25 cm. The SICK's own mirror takes 13 ms for a
-/// turn.
+/// Beams of the SICK LMS of Victoria Park, on a head that rotates while it scans: half a turn takes
+/// 50 ms, in which a car at 5 m/s moves by 25 cm. The SICK's own mirror takes 13 ms for a turn.
 struct PlanarLaserParameters {
-  int beams = 361;  ///< From the right to the left.
+  int beams = 361;  ///< From right to left.
   double first_bearing_rad = -0.5 * std::numbers::pi;
   double bearing_step_rad = std::numbers::pi / 360.0;
   double rate_hz = 10.0;
-  double revolution_s = 0.1;  ///< For all around; 0 = all beams at one instant.
+  double revolution_s = 0.1;  ///< For a full turn; 0 = all beams at one instant.
   double range_sigma_m = 0.02;
   double max_range_m = 80.0;
   double drop_out = 0.005;  ///< Share of returns lost by chance.
@@ -35,24 +34,24 @@ struct PlanarLaserParameters {
   double scan_s() const { return beam_interval_s() * (beams - 1); }
 };
 
-/// A scan as the sensor gives it, with the truth.
+/// A scan of the sensor, with the truth.
 struct SimulatedPlanarScan {
   model::PlanarScan scan;         ///< Beams without a return have max_range_m.
-  std::vector<ObjectId> objects;  ///< Per beam; the ground's where there is no return.
+  std::vector<ObjectId> objects;  ///< Per beam; the ground if there is no return.
   std::vector<std::uint8_t> is_return;
 };
 
 /// A one-plane laser in a world.
 class PlanarLaser {
  public:
-  /// `world` must outlive the sensor and stay as it is.
+  /// `world` must outlive the sensor and must not change.
   PlanarLaser(const World& world, const PlanarLaserParameters& parameters, std::uint64_t seed);
 
   /// Time of the first beam of scan k in the drive.
   double time_s(std::uint64_t k) const { return static_cast<double>(k) / parameters_.rate_hz; }
-  /// Of its last one.
+  /// Time of its last beam.
   double end_s(std::uint64_t k) const { return time_s(k) + parameters_.scan_s(); }
-  /// Scan number k, from time_s(k) of the drive on. Depends on nothing that was asked before.
+  /// Scan number k, starting at time_s(k) of the drive. Does not depend on earlier calls.
   SimulatedPlanarScan scan(const VehicleMotion& motion, std::uint64_t k,
                            model::Utime utime_of_start = 0);
 

@@ -11,11 +11,11 @@
 
 namespace understory::sim {
 
-/// A static index of points. Answers do not depend on the size of the tiles: indices come in
-/// ascending order, equal distances are decided by the index.
+/// A static index of points. Results do not depend on the size of the tiles: indices are ascending,
+/// equal distances are ordered by index.
 class PointGrid {
  public:
-  /// Tiles of `tile_m` over the bounding box of `points_m`; the points are copied. Fastest where
+  /// Tiles of `tile_m` over the bounding box of `points_m`; the points are copied. Fastest if
   /// `tile_m` is about the usual radius of a query.
   PointGrid(std::span<const Eigen::Vector2d> points_m, double tile_m);
 

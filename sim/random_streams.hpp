@@ -1,5 +1,5 @@
-// Independent random streams from one seed, so that a change in one part of a simulation leaves the
-// others as they were, and every method is compared on the same runs.
+// Independent random streams from one seed, so that a change in one part of a simulation does not
+// change the others, and all methods are compared on the same runs.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace understory::sim {
 
-/// What a stream of random numbers is for.
+/// Purpose of a random stream.
 enum class Stream : std::uint64_t {
   kForest = 1,
   kStartPose = 2,
@@ -28,7 +28,7 @@ inline std::mt19937_64 random_stream(std::uint64_t seed, Stream stream, std::uin
   return std::mt19937_64(mix(mix(mix(seed) ^ static_cast<std::uint64_t>(stream)) ^ index));
 }
 
-/// A number that is equally likely anywhere from low to high.
+/// A uniformly distributed number from low to high.
 inline double uniform(std::mt19937_64& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }

@@ -20,7 +20,7 @@ RayCaster::RayCaster(const World& world, double tile_m) : world_(world), tile_m_
   fill_grid();
 }
 
-/// Larger tiles where a long world would need too many of them.
+/// Larger tiles if a large world would need too many.
 void RayCaster::choose_tile(const Eigen::Vector2d& size_m) {
   constexpr double kMostTiles = 16e6;
   tile_m_ = std::max(tile_m_, std::sqrt(size_m.x() * size_m.y() / kMostTiles));
@@ -121,7 +121,7 @@ void RayCaster::gather_tile(int column, int row, const Sector& sector, double he
   }
 }
 
-/// Walks along the longer axis of the sector, strip of tiles by strip.
+/// Follows the longer axis of the sector, strip of tiles by strip.
 void RayCaster::gather(const Sector& sector, double height_m) {
   candidates_.clear();
   ++fan_;
@@ -205,7 +205,7 @@ void RayCaster::cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vec
     return;
   }
 
-  // No common bearing: one by one. A ray straight up or down meets what is at the apex.
+  // Without a common bearing: one by one. A vertical ray meets the objects at the apex.
   for (std::size_t i = 0; i < directions.size(); ++i) {
     if (!sector_of(origin_m, directions.subspan(i, 1), max_m, sector)) {
       sector.ahead = Eigen::Vector2d::UnitX();

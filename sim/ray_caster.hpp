@@ -1,4 +1,4 @@
-// What rays from one point meet in a world.
+// Intersections of rays from one point with a world.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,31 +10,31 @@
 
 namespace understory::sim {
 
-/// What one ray met.
+/// Result of one ray.
 struct RayHit {
-  double range_m = 0.0;  ///< The greatest range where nothing was met.
+  double range_m = 0.0;  ///< The largest range if there is no hit.
   double cosine = 0.0;   ///< Of the angle between the ray and the surface's normal.
   ObjectId object = kGroundObject;
   bool is_hit = false;
 };
 
-/// Casts fans of rays: what may be met is looked up once per fan, in a grid over the plan. Keeps
-/// working memory; one caster per thread.
+/// Casts fans of rays: candidates are looked up once per fan, in a grid over the plan. Has working
+/// memory; one caster per thread.
 class RayCaster {
  public:
   /// `world` must not change afterwards and must outlive the caster.
   explicit RayCaster(const World& world, double tile_m = 4.0);
 
-  /// The nearest hit of each ray from `origin_m` within `max_m`. Best if the directions (unit)
-  /// have nearly one bearing, as the beams of a spinning laser do. `luck` + index of the ray
-  /// decides where foliage stops it. hits.size() == directions.size().
+  /// The nearest hit of each ray from `origin_m` within `max_m`. Fastest if the directions (unit)
+  /// have nearly one bearing, like the beams of a spinning laser. `luck` + index of the ray
+  /// determines where foliage stops it. hits.size() == directions.size().
   void cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vector3d> directions,
             double time_s, double max_m, std::uint64_t luck, std::span<RayHit> hits);
-  /// The luck of ray `index` of a fan, as World::meet_object takes it.
+  /// The luck of ray `index` of a fan, for World::meet_object.
   static std::uint64_t luck_of_ray(std::uint64_t luck, std::size_t index);
 
  private:
-  /// A sector of the plan that holds all rays of a fan.
+  /// A sector of the plan that contains all rays of a fan.
   struct Sector {
     Eigen::Vector2d apex_m = Eigen::Vector2d::Zero();
     Eigen::Vector2d ahead = Eigen::Vector2d::UnitX();
@@ -45,7 +45,7 @@ class RayCaster {
   struct Candidate {
     double near_m = 0.0;  ///< In the plan.
     double far_m = 0.0;
-    double low_m = 0.0;  ///< Relative to the apex from here on.
+    double low_m = 0.0;  ///< Relative to the apex, like the following members.
     double high_m = 0.0;
     double radius_m = 0.0;
     Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();
@@ -69,7 +69,7 @@ class RayCaster {
   std::vector<std::uint32_t> first_of_tile_;  ///< columns * rows + 1 offsets into order_.
   std::vector<ObjectId> order_;
   std::vector<ObjectId> movers_;            ///< In no tile.
-  std::vector<std::uint32_t> seen_in_fan_;  ///< Per object: number of the fan that met it last.
+  std::vector<std::uint32_t> seen_in_fan_;  ///< Per object: number of the last fan that tested it.
   std::uint32_t fan_ = 0;
   std::vector<Candidate> candidates_;  ///< Of the present fan, by near_m.
 };

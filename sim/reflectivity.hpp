@@ -1,4 +1,4 @@
-// How much light surfaces send back.
+// Reflectivity of surfaces.
 #pragma once
 
 #include "sim/ray_caster.hpp"
@@ -6,14 +6,14 @@
 
 namespace understory::sim {
 
-/// How strongly a surface returns the laser's light.
+/// Reflection of the laser's light by a surface.
 struct Reflection {
   double reflectivity = 0.0;  ///< Share of the light, in (0, 1].
-  /// Of the angle of incidence, not less than what rough surfaces (grass, bark) make of it.
+  /// Of the angle of incidence, with a lower bound for rough surfaces (grass, bark).
   double cosine = 1.0;
 };
 
-/// Reflection at a hit. Each object has its own reflectivity, spread around that of its class.
+/// Reflection at a hit. Each object has its own reflectivity, distributed around that of its class.
 Reflection reflection_of(const World& world, const RayHit& hit);
 
 }  // namespace understory::sim

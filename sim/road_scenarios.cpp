@@ -1,4 +1,4 @@
-// Town and country of sim/scenarios.hpp.
+// Town and country scenarios of sim/scenarios.hpp.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -11,7 +11,8 @@
 namespace understory::sim {
 namespace {
 
-/// Of a recorded trajectory: a route keeps a point every 0.1 m while it is made, 160 MB of them.
+/// Of a recorded trajectory: the construction of a route stores a point every 0.1 m, 160 MB for
+/// this length.
 constexpr double kLongestTrajectoryM = 1e6;
 
 using Points = std::vector<Eigen::Vector2d>;
@@ -25,7 +26,7 @@ Scenario along_streets(const Route& route, const std::vector<Stretch>& stretches
           route};
 }
 
-/// A country road: gentle bends of random curvature, a sharper one now and then.
+/// A country road: gentle bends of random curvature, occasionally a sharper one.
 void append_country_road(Points& points, double heading_rad, double length_m,
                          std::mt19937_64& random) {
   const double step = 2.0;
@@ -46,7 +47,7 @@ void append_country_road(Points& points, double heading_rad, double length_m,
   }
 }
 
-/// Stretches of open country, in random order, until `length_m` is covered.
+/// Random stretches of open country, until `length_m` is covered.
 void append_country(std::vector<Stretch>& stretches, double length_m, std::mt19937_64& random) {
   for (double covered = 0.0; covered < length_m;) {
     const double chance = uniform(random, 0.0, 1.0);
@@ -95,7 +96,7 @@ Scenario urban_scenario(int laps, std::uint64_t seed, double overlap_m) {
   }
   const double lap_m = 2.0 * (215.0 + 140.0);
   const Route route = Route::through(shortened(points, laps * lap_m + overlap_m), kRounding);
-  // The world is that of one lap, whatever is driven.
+  // The world is that of one lap, whatever the number of laps.
   return along_streets(route, {{lap_m - 20.0, town_roadside()}, {1e9, Roadside{}}}, seed);
 }
 
@@ -115,7 +116,7 @@ Scenario countryside_scenario(double length_m, std::uint64_t seed) {
   Points points{{0, 0}, {20, 0}};
   append_country_road(points, 0.0, length_m, random);
   const Route route = Route::through(shortened(points, length_m), kRounding);
-  // Begins where there are landmarks: a filter needs a start.
+  // Begins with landmarks: a filter needs them at the start.
   std::vector<Stretch> stretches{{120.0, avenue_roadside()}};
   append_country(stretches, length_m, random);
   return along_streets(route, stretches, seed);
@@ -130,7 +131,7 @@ ScenarioResult pole_map_scenario(std::string_view poles_csv, std::string_view tr
   const StemMapResult path = parse_stem_map(trajectory_csv);
   if (!path.error.empty()) return {std::nullopt, "trajectory: " + path.error};
 
-  // While the car stood, its places scatter.
+  // Positions scatter while the car stands.
   Points points{path.forest.trunks_m.front()};
   double length_m = 0.0;
   for (const Eigen::Vector2d& p : path.forest.trunks_m) {

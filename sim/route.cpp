@@ -70,7 +70,7 @@ Route Route::through(std::span<const Eigen::Vector2d> waypoints_m, double roundi
   points = extended(points, 3 * half);
   for (int i = 0; i < 3; ++i) points = box_smoothed(points, half);
 
-  // Smoothing shortened the path in curves: even spacing again.
+  // Smoothing shortened the path in curves: restores equal spacing.
   points = resampled(points, kStep);
   Route route;
   route.length_m_ = kStep * static_cast<double>(points.size() - 1);

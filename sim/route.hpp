@@ -10,13 +10,12 @@
 
 namespace understory::sim {
 
-/// A curve by its length, smooth enough to be driven: curvature and its change are continuous.
+/// A drivable curve, parametrised by its length: curvature and its derivative are continuous.
 class Route {
  public:
-  /// Through `waypoints_m`, corners rounded over about 3 * `rounding_m` (the least radius
-  /// in a right angle is then about half of `rounding_m`) and measurement noise smoothed away.
-  /// Straight beyond its ends. Throws std::runtime_error where the points do not give a path of at
-  /// least 1 m.
+  /// Through `waypoints_m`, with corners rounded over about 3 * `rounding_m` (the least radius in a
+  /// right angle is then about half of `rounding_m`) and measurement noise smoothed. Straight
+  /// beyond its ends. Throws std::runtime_error if the points do not give a path of at least 1 m.
   static Route through(std::span<const Eigen::Vector2d> waypoints_m, double rounding_m);
 
   /// From end to end.
@@ -31,14 +30,14 @@ class Route {
   Place at(double along_m) const;
   /// The place as a pose, x along the route.
   geometry::SE2 pose(double along_m) const;
-  /// Places every `spacing_m`, the end included.
+  /// Places every `spacing_m`, including the end.
   std::vector<Eigen::Vector2d> places(double spacing_m) const;
   /// The route moved by `world_T_route`.
   Route moved(const geometry::SE2& world_T_route) const;
 
  private:
   UniformSpline<2> curve_;
-  double start_ = 0.0;  ///< Parameter where the route begins: control points extend beyond.
+  double start_ = 0.0;  ///< Parameter at the start of the route: control points extend beyond.
   double length_m_ = 0.0;
 };
 

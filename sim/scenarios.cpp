@@ -8,7 +8,7 @@
 namespace understory::sim {
 namespace {
 
-/// Turns on the spot become curves that a car can drive; others only lose their jumps of curvature.
+/// Rotations on the spot become drivable curves; other paths only lose their jumps of curvature.
 double rounding_m(PathKind kind) {
   switch (kind) {
     case PathKind::kSquare:

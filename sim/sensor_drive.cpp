@@ -35,7 +35,7 @@ std::uint64_t SensorDrive::sweep_count() const {
       std::floor(motion_.duration_s() * lidar_->parameters().revolutions_per_s + 1e-9));
 }
 
-/// Among equals the one that is named first: what others rest on comes before them.
+/// Among equal times the first listed source: others depend on it.
 SensorDrive::Due SensorDrive::next_due() const {
   Due due{std::numeric_limits<double>::infinity(), Source::kTruth};
   const auto offer = [&](double time_s, Source source) {
@@ -84,11 +84,11 @@ std::optional<SensorReading> SensorDrive::read(Source source) {
   return std::nullopt;
 }
 
-/// False where the source had nothing to give.
+/// False if the source has no reading.
 bool SensorDrive::skip(Source source) {
   if (source == Source::kLidar) return ++revolutions_, true;
   if (source == Source::kPlanarLaser) return ++scans_, true;
-  return read(source).has_value();  // errors of the others follow one another
+  return read(source).has_value();  // errors are correlated in time
 }
 
 bool SensorDrive::skip() {

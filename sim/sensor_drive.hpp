@@ -15,7 +15,7 @@
 
 namespace understory::sim {
 
-/// What the vehicle carries; none = not there.
+/// Sensors of the vehicle; none = absent.
 struct SensorSuite {
   std::optional<ImuParameters> imu = ImuParameters{};
   std::optional<WheelParameters> wheels = WheelParameters{};
@@ -42,8 +42,8 @@ struct Scenario {
   Route route;
 };
 
-/// Readings are made when asked for, in order of the time at which each is complete (a sweep when
-/// its revolution ends): a drive of any length costs no memory for them. Same arguments, same
+/// Readings are computed on request, in order of their completion (a sweep at the end of its
+/// revolution): a drive of any length needs no memory for them. The same arguments give the same
 /// readings.
 class SensorDrive {
  public:
@@ -55,17 +55,17 @@ class SensorDrive {
               std::uint64_t seed)
       : SensorDrive(std::move(scenario), VehicleParameters{}, speed, std::move(suite), seed) {}
 
-  /// The same along a motion that was recorded before; the scenario's route only says where that
-  /// leads in the plan.
+  /// Likewise along a recorded motion; the scenario's route is then only its projection in the
+  /// plan.
   SensorDrive(Scenario scenario, VehicleMotion motion, SensorSuite suite, std::uint64_t seed,
               model::Utime utime_of_start = 0);
 
   /// The next reading; none at the end of the drive.
   std::optional<SensorReading> next();
-  /// Passes the next reading by, which is quick: no sweep and no scan is made. False at the end.
+  /// Skips the next reading, which is fast: no sweep and no scan is computed. False at the end.
   bool skip();
 
-  /// The world driven through.
+  /// The world of the drive.
   const World& world() const { return *scenario_.world; }
   /// The route driven.
   const Route& route() const { return scenario_.route; }
@@ -77,7 +77,7 @@ class SensorDrive {
   VehicleState state_at(model::Utime utime) const {
     return motion_.at(1e-6 * static_cast<double>(utime - utime_of_start_));
   }
-  /// Any revolution of the LIDAR (which there must be), the same whether or not next() gave it.
+  /// Any revolution of the LIDAR (which must exist), the same whether or not next() returned it.
   SimulatedSweep sweep(std::uint64_t revolution) {
     return lidar_->sweep(motion_, revolution, utime_of_start_);
   }

@@ -1,4 +1,4 @@
-// The shapes of which simulated worlds are made, and where a ray meets them.
+// The shapes of simulated worlds, and their intersections with rays.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@ struct Ray {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  ///< Unit.
 };
 
-/// Where a ray first touches a surface from outside.
+/// First intersection of a ray with a surface from outside.
 struct SurfaceHit {
   double range_m = 0.0;
   double cosine = 1.0;  ///< Of the angle between the ray and the surface's normal, in [0, 1].
@@ -32,8 +32,8 @@ struct Stem {
   Eigen::Vector3d centre_at(double along_m) const { return base_m + along_m * axis; }
 };
 
-/// An ellipsoid with axes along x and y (equal) and z, filled with leaves: a ray goes
-/// exponentially far in it, 1 / density_per_m on average.
+/// An ellipsoid with axes along x and y (equal) and z, filled with leaves: the range of a ray in it
+/// is exponentially distributed with mean 1 / density_per_m.
 struct Foliage {
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
   double level_radius_m = 1.0;
@@ -56,7 +56,7 @@ struct Box {
   double heading_rad = 0.0;
 };
 
-/// An upright cylinder around an object, by which most rays rule it out cheaply.
+/// An upright cylinder around an object, a cheap first test for rays.
 struct Bounds {
   Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
@@ -72,7 +72,7 @@ Bounds bounds_of(const Wall& wall);
 /// The bounds of a box.
 Bounds bounds_of(const Box& box);
 
-/// The first touch from outside at a positive distance; none where the ray misses (or starts
+/// The first intersection from outside at a positive distance; none if the ray misses (or starts
 /// inside).
 std::optional<SurfaceHit> meet(const Ray& ray, const Stem& stem);
 /// The same for a wall, from its outside.

@@ -12,20 +12,21 @@ namespace {
 /// Sinusoids of a process along the path.
 constexpr int kSinusoids = 24;
 
-/// What a key is for.
+/// Purpose of a key.
 enum class Purpose : std::uint64_t { kShape = 1, kAlong = 2, kLevel = 3, kMissed = 4 };
 
 std::uint64_t key_of(std::uint64_t seed, Purpose purpose) {
   return mixed(seed, static_cast<std::uint64_t>(purpose));
 }
 
-/// A pair of standard normal numbers, number `index` of those of `key`.
+/// Pair number `index` of standard normal numbers of `key`.
 Eigen::Vector2d normal_pair(std::uint64_t key, std::uint64_t index) {
   return {normal_of(mixed(key, 2 * index)), normal_of(mixed(key, 2 * index + 1))};
 }
 
-/// Times the length of correlation: drawn from the density (1 - cos x) / (pi x^2), the spectrum of
-/// a correlation that falls in a straight line to 0 at distance 1 (rejection from min(1/2, 2/x^2)).
+/// Frequency times the correlation length: drawn from the density (1 - cos x) / (pi x^2), the
+/// spectrum of a correlation that decreases linearly to 0 at distance 1 (rejection from min(1/2,
+/// 2/x^2)).
 double drawn_frequency(std::uint64_t key) {
   for (std::uint64_t i = 0;; ++i) {
     const double u = 1.0 - uniform_of(mixed(key, 3 * i));
@@ -128,7 +129,7 @@ Eigen::Vector2d SharedErrors::by_direction(std::uint32_t landmark, double direct
          std::sqrt(static_cast<double>(parameters_.direction_harmonics)) * sum;
 }
 
-/// The range in the direction of the landmark, the bearing across it.
+/// Range error along the direction to the landmark, bearing error across it.
 Eigen::Vector2d SharedErrors::by_range_and_bearing(const Eigen::Vector2d& position_m) const {
   const double range_m = position_m.norm();
   if (!(range_m > 0.0)) return Eigen::Vector2d::Zero();

@@ -34,7 +34,7 @@ std::vector<double> hdl64_elevations() {
   return result;
 }
 
-/// Keys of the independent uses of chance of one ray.
+/// Keys of independent random numbers of one ray.
 enum Use : std::uint64_t { kFoliage = 1, kNoise = 2, kDropOut = 3, kWeak = 4, kWidth = 5 };
 
 }  // namespace
@@ -75,7 +75,7 @@ bool SpinningLidar::is_lost(const RayHit& hit, double reflectivity, std::uint64_
   return uniform_of(mixed(luck, kWeak)) < weakness / (1.0 + weakness);
 }
 
-/// Somewhere in each beam's width; `ahead` and `up` are axes of the sensor.
+/// Random directions within the beams' width; `ahead` and `up` are axes of the sensor.
 void SpinningLidar::point_beams(const Eigen::Vector3d& ahead, const Eigen::Vector3d& up,
                                 std::uint64_t luck) {
   const Eigen::Vector3d aside = up.cross(ahead);

@@ -1,4 +1,4 @@
-// A rotating laser scanner: many beams, one above the other, all around.
+// A rotating laser scanner: many beams, one above the other, over the full circle.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,17 +26,16 @@ struct LidarParameters {
   int columns = 1800;  ///< Firings per revolution; all beams of a column fire at once.
   double revolutions_per_s = 10.0;
   bool clockwise = true;                        ///< Viewed from above, as Velodyne's rotate.
-  double first_bearing_rad = std::numbers::pi;  ///< Frame `sensor`; where a revolution begins.
+  double first_bearing_rad = std::numbers::pi;  ///< Frame `sensor`; start of a revolution.
   double range_sigma_m = 0.02;
-  /// A beam is as wide as this to each side: what it meets within that is reported as if it lay in
-  /// its middle.
+  /// Half the width of a beam: a hit within it is reported on its axis.
   double beam_half_width_rad = 0.5e-3;
   double min_range_m = 0.8;
   double max_range_m = 100.0;
   double drop_out = 0.02;  ///< Share of returns lost by chance.
-  /// Greatest range at which half of the returns from a white, perpendicular surface come back;
-  /// dark and slanted ones are lost earlier (with the square root of what they reflect). 0 = no
-  /// loss.
+  /// Largest range at which half of the returns from a white, perpendicular surface are received;
+  /// returns of dark and slanted ones are lost at a smaller range (proportional to the square root
+  /// of the reflected share). 0 = no loss.
   double white_range_m = 220.0;
   Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(1.2, 0.0, 1.9));
 
@@ -44,11 +43,11 @@ struct LidarParameters {
   double revolution_s() const { return 1.0 / revolutions_per_s; }
 };
 
-/// A revolution as the sensor gives it, with the truth of every point.
+/// A revolution of the sensor, with the truth of every point.
 struct SimulatedSweep {
   model::PointSweep raw;                ///< Frame `sensor`, skewed; utime of the first point.
-  std::vector<ObjectId> objects;        ///< What each point lies on.
-  std::vector<Eigen::Vector3f> true_m;  ///< What was hit, frame `world`, without noise.
+  std::vector<ObjectId> objects;        ///< Object of each point.
+  std::vector<Eigen::Vector3f> true_m;  ///< True position of the hit, frame `world`, without noise.
 };
 
 /// Pose of the vehicle in `world` at a time [s].
@@ -57,21 +56,21 @@ using PoseAt = std::function<Eigen::Isometry3d(double time_s)>;
 /// A rotating LIDAR in a world.
 class SpinningLidar {
  public:
-  /// `world` must outlive the sensor and stay as it is.
+  /// `world` must outlive the sensor and must not change.
   SpinningLidar(const World& world, LidarParameters parameters, std::uint64_t seed);
 
-  /// Revolution number `revolution`, which begins at revolution * revolution_s() of the drive.
-  /// Depends on nothing that was asked before. `utime_of_start` is the utime of time 0.
+  /// Revolution number `revolution`, which begins at revolution * revolution_s() of the drive. Does
+  /// not depend on earlier calls. `utime_of_start` is the utime of time 0.
   SimulatedSweep sweep(const VehicleMotion& motion, std::uint64_t revolution,
                        model::Utime utime_of_start = 0);
-  /// The same for any motion.
+  /// Likewise for any motion.
   SimulatedSweep sweep(const PoseAt& world_T_vehicle, std::uint64_t revolution,
                        model::Utime utime_of_start = 0);
-  /// The same for a vehicle that is stationary at `world_T_vehicle`.
+  /// Likewise for a vehicle that is stationary at `world_T_vehicle`.
   SimulatedSweep sweep_stationary(const Eigen::Isometry3d& world_T_vehicle,
                                   std::uint64_t revolution = 0);
 
-  /// As given to the constructor.
+  /// The parameters of the constructor.
   const LidarParameters& parameters() const { return parameters_; }
 
  private:

@@ -17,10 +17,10 @@ namespace {
 constexpr double kBreastHeightM = 1.3;
 constexpr double kSensorHeightM = 1.5;
 constexpr double kMostSidewaysM = 1.0;
-/// Diameters that a survey does not have: median, and sigma of the logarithm.
+/// Diameters that a survey lacks: median, and sigma of the logarithm.
 constexpr double kMedianDiameterM = 0.28;
 constexpr double kDiameterLogSigma = 0.4;
-/// A stem is detected where so much of its width is in view.
+/// A stem is detected if this share of its width is visible.
 constexpr double kLeastVisibleShare = 0.5;
 
 /// Uniform from 0 to 1, the same for the same arguments.
@@ -49,10 +49,10 @@ struct InRange {
   double half_width_rad = 0.0;
 };
 
-/// Angles that nearer trunks hide.
+/// Angles hidden by nearer trunks.
 class Shadows {
  public:
-  /// Share of the stem's width that is in view.
+  /// Visible share of the stem's width.
   double visible_share(const InRange& stem) const {
     constexpr int kRays = 8;
     int open = 0;
@@ -148,7 +148,7 @@ class StemDrive {
     return drawn(seed_, 16 + visit, stem) < parameters_.detector.seen_share;
   }
 
-  /// What the detector makes of the stem's place, but for the independent noise.
+  /// Position of the stem with the detector's shared errors, without the independent noise.
   Eigen::Vector2d shown_m(const InRange& stem, const geometry::SE2& pose, double along_m) const {
     if (!parameters_.detector.shared.any()) return stem.level_m;
     return stem.level_m + shared_.error_m(stem.stem, stem.level_m, pose, along_m);
@@ -215,7 +215,7 @@ class StemDrive {
   double shift_m_ = 0.0;
 };
 
-/// The forest that the drive has to itself: thinned where few stems are wanted.
+/// The drive's own forest: thinned if few stems are requested.
 Forest forest_of(const Forest& forest, const Route& way, const StemDriveParameters& parameters,
                  std::uint64_t seed) {
   if (!(parameters.stems_in_view > 0.0)) return forest;

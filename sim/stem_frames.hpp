@@ -17,62 +17,63 @@
 
 namespace understory::sim {
 
-/// What a detector of stems misses and gets wrong. Sigmas are standard deviations.
+/// Misses and errors of a stem detector. Sigmas are standard deviations.
 struct StemDetectorParameters {
   double range_m = 25.0;
   double least_diameter_m = 0.08;  ///< Thinner stems are never detected.
-  /// Of the stems, a new draw for each visit: what one visit detects at all. Two visits share so
-  /// many of the stems of either.
+  /// Share of the stems that one visit detects at all, drawn anew for each visit. Two visits have
+  /// this share of each one's stems in common.
   double seen_share = 0.64;
-  double detection = 0.9;                    ///< Of those in each frame, where nothing hides them.
-  double false_per_frame = 1.0;              ///< Mean number of stems that are none.
-  double position_sigma_m = 0.03;            ///< Per axis, of a frame: independent.
-  double diameter_sigma_share = 0.1;         ///< Of a diameter, of a frame.
+  double detection = 0.9;                    ///< Of those in each frame, unless occluded.
+  double false_per_frame = 1.0;              ///< Mean number of false detections.
+  double position_sigma_m = 0.03;            ///< Per axis, per frame: independent.
+  double diameter_sigma_share = 0.1;         ///< Of a diameter, per frame.
   double tilt_sigma_rad = 0.05;              ///< Roll and pitch of the sensor.
-  double view_rad = 2.0 * std::numbers::pi;  ///< Width of the field of view, its middle ahead.
-  SharedErrorParameters shared;              ///< Errors of true stems on top, which frames share.
+  double view_rad = 2.0 * std::numbers::pi;  ///< Width of the field of view, centred ahead.
+  SharedErrorParameters shared;  ///< Additional errors of true stems, common to several frames.
 };
 
-/// How it is driven.
+/// Parameters of the drive.
 struct StemDriveParameters {
   StemDetectorParameters detector;
   double spacing_m = 2.0;  ///< Between frames.
   double speed_mps = 1.0;
-  double visit_gap_s = 60.0;  ///< A stem that was out of range for so long is visited anew.
-  /// Two drives with one seed and other visits are drives on other days: other stems are detected,
-  /// the way lies up to a metre beside.
+  double visit_gap_s = 60.0;  ///< A stem that was out of range for this time is visited anew.
+  /// Two drives with one seed and different visits are drives on different days: other stems are
+  /// detected, and the path is up to a metre beside.
   std::uint64_t visit = 0;
-  double truth_offset_m = 0.0;  ///< Of the drive's truth, in x and in y: references disagree.
-  /// The forest is thinned until the way has so many stems in view on average, those that other
-  /// stems hide or the detector misses included; 0 = as it is. Visits share what is left.
+  double truth_offset_m =
+      0.0;  ///< Of the drive's truth, in x and in y: offset between reference systems.
+  /// The forest is thinned until this number of stems is in view of the path on average, including
+  /// occluded and missed ones; 0 = not thinned. All visits use the same thinned forest.
   double stems_in_view = 0.0;
 };
 
-/// How a way through a forest is laid out.
+/// Kinds of paths through a forest.
 enum class StemWay {
-  kLaps,          ///< Round a closed way of random corners, and again and again.
-  kThereAndBack,  ///< A random way, and back on it.
+  kLaps,          ///< Laps on a closed path with random corners.
+  kThereAndBack,  ///< A random path, and back on it.
   kWander,        ///< Through random points, crossing itself.
 };
 /// By name, e.g. "there-and-back"; none for another.
 std::optional<StemWay> stem_way(std::string_view name);
-/// All names that stem_way() takes.
+/// All names accepted by stem_way().
 std::vector<std::string> stem_way_names();
 
-/// A way of about `length_m` [m] inside the forest, 8 m from its edges; laps and the way back lie
-/// about a metre beside each other. The same seed gives the same way. Throws std::runtime_error
-/// where the forest is less than 50 m wide.
+/// A path of about `length_m` [m] inside the forest, 8 m from its edges; laps and the way back are
+/// about a metre apart. The same seed gives the same path. Throws std::runtime_error if the forest
+/// is less than 50 m wide.
 Route make_stem_way(StemWay kind, const Forest& forest, double length_m, std::uint64_t seed);
 
-/// A recorded way, turned nowhere but shrunk where it does not fit, in the middle of the forest,
-/// 8 m from its edges. Throws std::runtime_error where it has less than two places.
+/// A recorded path, not rotated but shrunk if it does not fit, in the middle of the forest, 8 m
+/// from its edges. Throws std::runtime_error if it has less than two points.
 Route fit_stem_way(std::span<const Eigen::Vector2d> recorded_m, const Forest& forest);
 
-/// The frames of a drive on the way: stems in range, nearer trunks hide those behind, in random
-/// order; of the shared errors, the part by direction follows from the seed alone and returns at
-/// other visits; diameters that the forest does not have are drawn. Position and axis of a stem
-/// are 1.3 m above level ground, frame `sensor`, which is 1.5 m above it. The same arguments give
-/// the same frames.
+/// The frames of a drive on the path: stems in range, in random order; nearer trunks hide those
+/// behind; of the shared errors, the part by direction follows from the seed alone and repeats at
+/// other visits; diameters that the forest lacks are drawn. Position and axis of a stem are 1.3 m
+/// above level ground, frame `sensor`, which is 1.5 m above it. The same arguments give the same
+/// frames.
 std::vector<model::StemFrame> drive_stem_frames(const Forest& forest, const Route& way,
                                                 const StemDriveParameters& parameters,
                                                 std::uint64_t seed);

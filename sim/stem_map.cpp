@@ -7,9 +7,9 @@
 namespace understory::sim {
 namespace {
 
-/// No survey's origin is farther away (UTM northings end at 1e7 m), none reaches farther, no trunk
-/// is thicker: what lies beyond is a damaged number, and a grid or a route over it would not fit
-/// into memory.
+/// Limits of surveys: distance of the origin (UTM northings end at 1e7 m), extent, diameter of a
+/// trunk. A value beyond is a damaged number, and a grid or a route over it would not fit into
+/// memory.
 constexpr double kFarthestM = 1e8;
 constexpr double kWidestM = 2e5;
 constexpr double kThickestM = 20.0;
@@ -39,7 +39,7 @@ std::optional<double> number(std::string_view cell) {
   return value;
 }
 
-/// Where the columns are that we read; -1 = not there.
+/// Column numbers of the used columns; -1 = missing.
 struct Columns {
   int x = -1;
   int y = -1;
@@ -55,7 +55,7 @@ Columns columns_of(const std::vector<std::string_view>& header) {
   return columns;
 }
 
-/// What is wrong with a coordinate, given that of the first row; none if nothing.
+/// Fault of a coordinate, given that of the first row; none if it is valid.
 std::optional<std::string> fault_of(std::string_view column, double value_m, double first_m) {
   if (std::abs(value_m) > kFarthestM) {
     return std::string(column) + " is farther than 1e8 m from the origin";

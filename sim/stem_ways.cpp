@@ -18,7 +18,7 @@ namespace {
 constexpr double kEdgeM = 8.0;
 constexpr double kLeastWidthM = 50.0;
 constexpr double kRoundingM = 8.0;
-/// Laps and the way back lie so far beside the way there, on either side.
+/// Distance of laps and of the way back from the first way, on either side.
 constexpr double kBesideM = 1.0;
 constexpr int kCorners = 7;
 constexpr int kMostDraws = 20000;
@@ -36,7 +36,7 @@ double length_of(const WayPoints& points) {
   return length;
 }
 
-/// The part of a forest in which a way may lie: away from its edges, and where stems are.
+/// The part of a forest for paths: away from its edges, with stems around.
 class WayBox {
  public:
   explicit WayBox(const Forest& forest)
@@ -58,7 +58,7 @@ class WayBox {
   Eigen::Vector2d clamped(const Eigen::Vector2d& point_m) const {
     return point_m.cwiseMax(low_m_).cwiseMin(high_m_);
   }
-  /// A place among stems.
+  /// A random position among stems.
   Eigen::Vector2d draw(std::mt19937_64& random) const {
     for (int i = 0; i < kTries; ++i) {
       const double x = uniform(random, low_m_.x(), high_m_.x());
@@ -67,7 +67,7 @@ class WayBox {
     }
     throw std::runtime_error("no place for a way among the stems was found");
   }
-  /// Whether there are stems all along.
+  /// Whether there are stems along the whole line.
   bool is_among_stems(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m) const {
     const auto steps = static_cast<int>(std::ceil((to_m - from_m).norm() / kSampleM));
     for (int i = 0; i <= steps; ++i) {
@@ -94,7 +94,7 @@ class WayBox {
   double least_around_ = 0.0;
 };
 
-/// Corners of a closed way round the middle: a star-shaped polygon that fits the box.
+/// Corners of a closed path round the middle: a star-shaped polygon that fits the box.
 WayPoints star_polygon(const WayBox& box, double length_m, std::mt19937_64& random) {
   WayPoints corners;
   corners.reserve(kCorners);
@@ -146,7 +146,7 @@ WayPoints wander_points(const WayBox& box, double length_m, std::mt19937_64& ran
   return points;
 }
 
-/// The same places, then a turn, then the places backwards on the left side of what was the way.
+/// The points, then a turn, then the points in reverse order on the left side of the path.
 WayPoints there_and_back_points(const WayBox& box, double length_m, std::mt19937_64& random) {
   const WayPoints there = wander_points(box, 0.5 * length_m, random);
   const Route way = Route::through(there, kRoundingM);

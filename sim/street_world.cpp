@@ -12,7 +12,7 @@ namespace {
 
 using std::numbers::pi;
 
-/// Puts things beside the route, where there is room for them.
+/// Places objects beside the route, in free space.
 class Builder {
  public:
   Builder(const Route& route, const StreetWorldParameters& parameters, std::mt19937_64& random)
@@ -24,7 +24,7 @@ class Builder {
 
   void build(double from_m, double to_m, const Roadside& roadside) {
     const double wood_side = uniform(0.0, 1.0) < 0.5 ? 1.0 : -1.0;
-    // Houses first: everything else is placed around them.
+    // Houses first: all other objects are placed around them.
     repeat(from_m, to_m, roadside.houses, [&](double s) { add_house(s); });
     repeat(from_m, to_m, roadside.cars, [&](double s) { add_car(s); });
     repeat(from_m, to_m, roadside.poles, [&](double s) { add_pole(s); });
@@ -67,7 +67,7 @@ class Builder {
     for (int i = 0; i < count; ++i) add(uniform(from_m, to_m));
   }
 
-  /// `aside_m` to the left of the route at `along_m`.
+  /// Position `aside_m` to the left of the route at `along_m`.
   Eigen::Vector2d beside(double along_m, double aside_m) const {
     const Route::Place place = route_.at(along_m);
     return place.position_m +

@@ -12,7 +12,7 @@
 
 namespace understory::sim {
 
-/// What lines a stretch of the route; numbers are means per 100 m of it, both sides together.
+/// Objects along a stretch of the route; numbers are means per 100 m, both sides together.
 struct Roadside {
   double houses = 0.0;
   double cars = 0.0;   ///< Parked.
@@ -20,37 +20,37 @@ struct Roadside {
   double trees = 0.0;  ///< In gardens and along the route.
   double bushes = 0.0;
   double people = 0.0;
-  double wood_trees = 0.0;  ///< In a wood a little off the route, on one side.
+  double wood_trees = 0.0;  ///< In a wood slightly off the route, on one side.
 };
 Roadside town_roadside();     ///< Houses, parked cars, lamps, gardens.
 Roadside avenue_roadside();   ///< Trees and delineators along a country road.
-Roadside field_roadside();    ///< Next to nothing.
+Roadside field_roadside();    ///< Almost nothing.
 Roadside wood_roadside();     ///< A wood on one side.
 Roadside village_roadside();  ///< A few houses and their gardens.
 
-/// A part of the route and what lines it.
+/// A part of the route and its roadside.
 struct Stretch {
   double length_m = 100.0;
   Roadside roadside;
 };
 
-/// Frame `world`; the route is the middle of the lane that is driven.
+/// Frame `world`; the route is the middle of the driven lane.
 struct StreetWorldParameters {
   GroundParameters ground{
       .slope = {0.004, -0.006}, .relief_m = 0.15, .roughness_m = 0.006, .cover_m = 0.005};
   ForestWorldParameters plants;   ///< Shapes of trees.
   double house_distance_m = 9.0;  ///< Least, from the route to a house.
-  double clearance_m = 2.2;       ///< Nothing is placed nearer than this to the route.
+  double clearance_m = 2.2;       ///< Least distance of objects from the route.
 };
 
-/// A world along `route`; the last stretch goes on to its end. No house is placed where another
-/// part of the route passes, nor in another house.
+/// A world along `route`; the last stretch continues to its end. No house is placed on another part
+/// of the route, nor in another house.
 World make_street_world(const Route& route, std::span<const Stretch> stretches,
                         const StreetWorldParameters& parameters, std::mt19937_64& random);
 
 /// The given poles, those of unknown radius half of them trees (as are those thicker than 0.12 m),
-/// with parked cars, bushes and people along `route`. Poles nearer to the route than the
-/// clearance are left out.
+/// with parked cars, bushes and people along `route`. Poles nearer to the route than the clearance
+/// are removed.
 World make_pole_world(const Route& route, const Forest& poles,
                       const StreetWorldParameters& parameters, std::mt19937_64& random);
 

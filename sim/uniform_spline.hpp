@@ -1,4 +1,4 @@
-// A smooth curve through time or along a path, from evenly spaced control points.
+// A smooth curve over time or path length, from equidistant control points.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,8 +11,8 @@
 namespace understory::sim {
 
 /// A uniform B-spline of degree 5: four continuous derivatives. Control point k belongs to
-/// parameter k * step and pulls the curve towards itself (the curve is its smoothed self: where the
-/// points bend by p'', it keeps p'' step^2 / 4 away from them). Beyond the ends it stays at the end
+/// parameter k * step and attracts the curve (the curve is a smoothed version of the points: where
+/// they bend by p'', its distance from them is p'' step^2 / 4). Beyond the ends it stays at the end
 /// points.
 template <int N>
 class UniformSpline {
@@ -74,7 +74,7 @@ class UniformSpline {
     double second[6];
   };
 
-  /// Base functions of degrees `degree` that do not vanish at x in [0, 1), by de Boor's recursion.
+  /// Base functions of degree `degree` that do not vanish at x in [0, 1), by de Boor's recursion.
   template <int Degree>
   static void base(double x, double (&b)[Degree + 1]) {
     b[0] = 1.0;
@@ -97,7 +97,7 @@ class UniformSpline {
     double cubic[4];
     base<3>(x, cubic);
 
-    // The derivative of a base function is the difference of two of the degree below.
+    // The derivative of a base function is the difference of two of one degree lower.
     for (int i = 0; i < 6; ++i) {
       w.first[i] = (i > 0 ? quartic[i - 1] : 0.0) - (i < 5 ? quartic[i] : 0.0);
       const double here = i < 4 ? cubic[i] : 0.0;

@@ -10,10 +10,10 @@ namespace {
 
 constexpr double kMotionStep = 0.02;  ///< [s]
 constexpr double kSpacing = 0.25;     ///< Of the speed limits along the route [m].
-constexpr double kEasing = 0.6;       ///< Over which a change of acceleration is spread [s].
+constexpr double kEasing = 0.6;       ///< Time over which a change of acceleration is spread [s].
 
-/// Greatest speed at every kSpacing of the route, by curvature, by stops and by what the engine
-/// and the brakes allow (forward and backward pass).
+/// Largest speed at every kSpacing of the route, by curvature, by stops and by the limits of engine
+/// and brakes (forward and backward pass).
 std::vector<double> speed_limits(const Route& route, const SpeedParameters& parameters) {
   const auto count = static_cast<std::size_t>(std::floor(route.length_m() / kSpacing)) + 1;
   std::vector<double> squared(count);
@@ -55,7 +55,7 @@ double standing_at(const SpeedParameters& parameters, std::size_t place, std::si
 std::vector<double> distances(const Route& route, const SpeedParameters& parameters) {
   const std::vector<double> limits = speed_limits(route, parameters);
 
-  // Time at which each place is left and reached; between places the acceleration is constant.
+  // Times of departure and arrival at each place; between places the acceleration is constant.
   std::vector<double> along;
   const auto stand = [&](double seconds, double at_m) {
     along.insert(along.end(), static_cast<std::size_t>(std::lround(seconds / kMotionStep)), at_m);
@@ -85,7 +85,7 @@ std::vector<double> distances(const Route& route, const SpeedParameters& paramet
   return along;
 }
 
-/// Mean over a window of `half` steps to both sides; the ends are held.
+/// Mean over a window of `half` steps to both sides; the end values are repeated.
 std::vector<double> box_smoothed(const std::vector<double>& values, int half) {
   std::vector<double> result(values.size());
   const auto at = [&](std::ptrdiff_t i) {
@@ -94,7 +94,7 @@ std::vector<double> box_smoothed(const std::vector<double>& values, int half) {
   };
   const auto count = static_cast<std::ptrdiff_t>(values.size());
   for (std::ptrdiff_t i = 0; i < count; ++i) {
-    // Relative to the middle: constant stretches stay constant to the last bit.
+    // Relative to the middle: constant stretches stay bitwise constant.
     double sum = 0.0;
     for (std::ptrdiff_t k = i - half; k <= i + half; ++k) sum += at(k) - at(i);
     result[static_cast<std::size_t>(i)] = at(i) + sum / (2 * half + 1);
@@ -102,7 +102,7 @@ std::vector<double> box_smoothed(const std::vector<double>& values, int half) {
   return result;
 }
 
-/// Height, roll and pitch of the body: each follows its goal as a damped spring does.
+/// Height, roll and pitch of the body: each follows its target like a damped spring.
 class Suspension {
  public:
   explicit Suspension(const VehicleParameters& parameters)

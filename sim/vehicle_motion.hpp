@@ -23,16 +23,16 @@ struct VehicleParameters {
   double roll_per_mps2 = 0.012;     ///< [rad] Outwards per acceleration to the side.
 };
 
-/// How the vehicle is driven: speeds, accelerations, stops.
+/// Speeds, accelerations and stops of the drive.
 struct SpeedParameters {
-  /// At the start, where an IMU is calibrated. Below a second the drive begins with a jolt: the
-  /// suspension settles on the slope meanwhile. To begin on the move, leave out the first readings.
+  /// At the start, for the calibration of an IMU. Below a second the drive begins with a jolt: the
+  /// suspension settles on the slope in this time. To begin in motion, skip the first readings.
   double standstill_s = 22.0;
   double end_standstill_s = 3.0;
   double cruise_mps = 5.0;
   double acceleration_mps2 = 1.0;
   double braking_mps2 = 1.5;
-  double lateral_mps2 = 1.5;  ///< Greatest in curves.
+  double lateral_mps2 = 1.5;  ///< Largest in curves.
   /// A stop of `seconds` on the route.
   struct Stop {
     double along_m = 0.0;  ///< Of the route.
@@ -41,8 +41,7 @@ struct SpeedParameters {
   std::vector<Stop> stops;  ///< In order of along_m.
 };
 
-/// Where the car is and how it moves, exactly: rates and accelerations are the derivatives of the
-/// pose.
+/// Pose and motion of the car, exactly: rates and accelerations are the derivatives of the pose.
 struct VehicleState {
   double time_s = 0.0;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< Frame `world`.
@@ -57,20 +56,20 @@ struct VehicleState {
 
   /// The pose in three dimensions.
   Eigen::Isometry3d world_T_vehicle() const;
-  /// Heading and place in the plan: `world` from `vehicle_level`.
+  /// Heading and position in the plan: `world` from `vehicle_level`.
   geometry::SE2 world_T_level() const { return {position_m.head<2>(), yaw_rad}; }
 };
 
-/// The motion is simulated once (20 ms steps, 48 bytes each) and then is a smooth curve through
-/// time, of which everything else is derived.
+/// The motion is simulated once (20 ms steps, 48 bytes each) and then interpolated by a smooth
+/// curve over time; all other quantities are derived from it.
 class VehicleMotion {
  public:
   /// Simulates the drive along `route` on `ground`.
   VehicleMotion(const Route& route, const Ground& ground, const VehicleParameters& vehicle,
                 const SpeedParameters& speed);
-  /// A recorded motion, whatever made it (a body that flies, say): `poses` are (x, y, z, roll,
-  /// pitch, yaw) in `world`, yaw unwrapped, every `step_s` [s] from time 0; at least one. The
-  /// motion is the smooth curve that UniformSpline draws through them.
+  /// A recorded motion of any body (for example a flying one): `poses` are (x, y, z, roll, pitch,
+  /// yaw) in `world`, yaw unwrapped, every `step_s` [s] from time 0; at least one. The motion is
+  /// the UniformSpline of these control points.
   static VehicleMotion replayed(std::vector<UniformSpline<6>::Vector> poses, double step_s);
 
   /// From the first to the last instant, both stationary.
@@ -79,7 +78,7 @@ class VehicleMotion {
   double driven_m() const { return driven_m_; }
   /// The state at a time, clamped to [0, duration].
   VehicleState at(double time_s) const;
-  /// As given to the constructor.
+  /// The parameters of the constructor.
   const VehicleParameters& parameters() const { return vehicle_; }
 
  private:

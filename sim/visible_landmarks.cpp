@@ -55,7 +55,7 @@ std::vector<VisibleTrunk> visible_trunks(const World& world, const SimulatedPlan
 
 std::vector<VisibleCorner> visible_corners(const World& world, const SimulatedSweep& sweep,
                                            const VehicleState& state, double side_m) {
-  // Points of each wall, for the walls that were hit.
+  // Points on each wall that was hit.
   std::map<ObjectId, std::vector<Eigen::Vector2d>> walls;
   for (std::size_t i = 0; i < sweep.objects.size(); ++i) {
     if (world.kind(sweep.objects[i]) != ObjectClass::kWall) continue;

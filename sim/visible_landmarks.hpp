@@ -1,4 +1,4 @@
-// What a landmark extractor should find in a sweep: the truth to measure it against.
+// Landmarks that an extractor should find in a sweep: the reference for its evaluation.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,12 +13,12 @@
 
 namespace understory::sim {
 
-/// A trunk or pole with returns. Frame `vehicle_level` of the state that was asked for.
+/// A trunk or pole with returns. Frame `vehicle_level` of the given state.
 struct VisibleTrunk {
   ObjectId object = 0;
   ObjectClass kind = ObjectClass::kTrunk;
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< 1.3 m above the ground.
-  double radius_m = 0.0;                               ///< There.
+  double radius_m = 0.0;                               ///< At that height.
   double range_m = 0.0;                                ///< From the vehicle's origin, in the plan.
   std::uint32_t returns = 0;
 };
@@ -27,7 +27,7 @@ struct VisibleCorner {
   std::uint32_t corner = 0;                              ///< Index in World::corners().
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< On the ground.
   double bisector_rad = 0.0;  ///< Out of the house, from straight ahead, left positive.
-  double angle_rad = 0.0;     ///< Through the air; more than pi where the house's edge sticks out.
+  double angle_rad = 0.0;     ///< Outside the house; more than pi at a convex edge.
   double range_m = 0.0;
   std::uint32_t returns_before = 0;  ///< On the wall that ends there, within `side_m` of the edge.
   std::uint32_t returns_after = 0;   ///< On the wall that begins there.

@@ -11,7 +11,7 @@ namespace {
 
 using std::numbers::pi;
 constexpr double kBreastHeight = 1.3;
-constexpr double kRoot = 0.5;  ///< Depth of everything below the ground, against gaps on slopes.
+constexpr double kRoot = 0.5;  ///< Depth of all objects below the ground, against gaps on slopes.
 
 double direction_of(const Eigen::Vector2d& v) { return std::atan2(v.y(), v.x()); }
 
@@ -149,7 +149,7 @@ std::optional<SurfaceHit> World::meet_ground(const Ray& ray, double max_m,
   if (!hit) return std::nullopt;
   SurfaceHit met{hit->range_m, hit->cosine};
   if (ground_.cover_m() > 0.0 && hit->closing_m_m > 0.0) {
-    // A ray that grazes is stopped long before; by no more than a metre: grass is not a wall.
+    // A grazing ray is stopped long before; by at most a metre: grass is not a wall.
     const double height_m = ground_.cover_m() * exponential_of(mixed(luck, kGroundObject));
     met.range_m = std::max(0.0, met.range_m - std::min(1.0, height_m / hit->closing_m_m));
   }

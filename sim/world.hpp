@@ -1,4 +1,4 @@
-// A simulated world in three dimensions: ground, and the objects on it.
+// A simulated 3-D world: ground, and objects on it.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,29 +13,29 @@
 
 namespace understory::sim {
 
-/// What an object is, for reflectivity and for the truth of a classifier.
+/// Class of an object, for reflectivity and for the truth of a classifier.
 enum class ObjectClass : std::uint8_t {
   kGround,
   kTrunk,
-  kPole,    ///< Lamp post, traffic sign, fence post: round and upright as a trunk is.
+  kPole,    ///< Lamp post, traffic sign, fence post: round and upright like a trunk.
   kBranch,  ///< Dead branch on a trunk.
   kCrown,
   kBush,
   kWall,  ///< Of a house; two of them meet in a corner.
   kCar,
   kPerson,
-  kFurniture,  ///< Desks, racks, boxes, tanks: what stands in a room or lies in a wood.
+  kFurniture,  ///< Desks, racks, boxes, tanks; also logs in a forest.
 };
 
 /// Index of an object in its world; the ground has none of its own.
 using ObjectId = std::uint32_t;
 inline constexpr ObjectId kGroundObject = 0xffffffffU;
 
-/// A place on a trunk (or pole) that a mapper should find.
+/// A position on a trunk (or pole) that a mapper should find.
 struct TrueTrunk {
   ObjectId object = 0;
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< Of the stem, 1.3 m above the ground.
-  double radius_m = 0.0;                               ///< There.
+  double radius_m = 0.0;                               ///< At that height.
 };
 /// An upright edge of a house, where two walls meet.
 struct TrueCorner {
@@ -43,7 +43,7 @@ struct TrueCorner {
   double ground_m = 0.0;
   /// Direction of the bisector, out of the house, in `world`.
   double bisector_rad = 0.0;
-  /// Between the walls, through the air: 3/2 pi at the outer corner of a square house.
+  /// Angle between the walls, outside the house: 3/2 pi at the outer corner of a square house.
   double angle_rad = 0.0;
   ObjectId wall_before = 0;  ///< Ends at the corner.
   ObjectId wall_after = 0;   ///< Begins there.
@@ -63,21 +63,21 @@ struct Walker {
   Stem at(double time_s) const;
 };
 
-/// Everything in frame `world` (x east, y north, z up). Objects are added once and then fixed.
+/// All in frame `world` (x east, y north, z up). Objects are added once and never changed.
 class World {
  public:
   /// Without objects.
   explicit World(Ground ground = {}) : ground_(std::move(ground)) {}
 
-  /// Adds a stem; gives its index.
+  /// Adds a stem; returns its index.
   ObjectId add(ObjectClass kind, const Stem& stem);
-  /// Adds foliage; gives its index.
+  /// Adds foliage; returns its index.
   ObjectId add(ObjectClass kind, const Foliage& foliage);
-  /// Adds a wall; gives its index.
+  /// Adds a wall; returns its index.
   ObjectId add(ObjectClass kind, const Wall& wall);
-  /// Adds a box; gives its index.
+  /// Adds a box; returns its index.
   ObjectId add(ObjectClass kind, const Box& box);
-  /// Adds a walker; gives its index.
+  /// Adds a walker; returns its index.
   ObjectId add(const Walker& walker);
   /// A trunk or pole whose centre 1.3 m above the ground at `breast_m` has radius `radius_m`;
   /// rooted below the ground. `lean` is the horizontal part of its axis.
@@ -98,14 +98,15 @@ class World {
   const Bounds& bounds(ObjectId object) const { return objects_[object].bounds; }
   /// Whether the object is a walker.
   bool moves(ObjectId object) const { return objects_[object].shape == Shape::kWalker; }
-  /// What chance goes by where rays meet the object: which leaf stops one, how bright it is. Its
-  /// id, unless set_key() gave another one.
+  /// Key of the object's random properties: which leaf stops a ray, its reflectivity. Its id,
+  /// unless set_key() set another one.
   std::uint64_t key(ObjectId object) const {
     return object == kGroundObject ? kGroundObject : objects_[object].key;
   }
-  /// Gives the object a key that outlasts its id, so that it looks the same in another world.
+  /// Sets a key that does not depend on the object's id, so that it looks the same in another
+  /// world.
   void set_key(ObjectId object, std::uint64_t key) { objects_[object].key = key; }
-  /// The shape of a trunk, pole, branch or tank; null where the object has another one.
+  /// The shape of a trunk, pole, branch or tank; null for other shapes.
   const Stem* stem(ObjectId object) const;
 
   /// The trunks and poles added by add_trunk(), in order.
@@ -113,11 +114,11 @@ class World {
   /// The corners of all houses.
   std::span<const TrueCorner> corners() const { return corners_; }
 
-  /// Where the ray meets the object at `time_s`. `luck` decides how far the ray gets through
+  /// Intersection of the ray with the object at `time_s`. `luck` determines the ray's range in
   /// foliage.
   std::optional<SurfaceHit> meet_object(const Ray& ray, ObjectId object, double time_s,
                                         std::uint64_t luck) const;
-  /// Where the ray meets the ground, or what covers it, within `max_m`.
+  /// Intersection of the ray with the ground, or its cover, within `max_m`.
   std::optional<SurfaceHit> meet_ground(const Ray& ray, double max_m, std::uint64_t luck) const;
 
  private:

@@ -80,7 +80,7 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
 
   template <class T, class Take>
   void hear(const char* channel, const T& value, const Take& take) {
-    if (!host_) return;  // In a replay nobody looks.
+    if (!host_) return;  // No page in a replay.
     const std::int64_t wall_us = clock_.wall_us();
     run_.take(value, take, wall_us);
     if (host_->foxglove().wants(channel))
@@ -88,17 +88,17 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
   }
 
   void watch(std::int64_t wall_us) {
-    // The board is changed meanwhile: names first.
+    // take() changes the board: copies the names first.
     std::vector<std::pair<std::string, std::int64_t>> processes;
     for (const auto& [name, entry] : run_.scene().processes().entries())
       processes.emplace_back(name, entry.health.pid);
     for (const auto& [name, pid] : processes) {
-      if (pid <= 0) continue;  // HEALTH of the supervisor for one that it gave up.
+      if (pid <= 0) continue;  // HEALTH sent by the supervisor for a process that it gave up.
       run_.scene().processes().take(name, look_at_process(pid), wall_us);
     }
   }
 
-  /// Who comes late has heard no MAP.
+  /// A late subscriber has missed MAP.
   void ask_for_map(std::int64_t monotonic_us) {
     if (monotonic_us - asked_us_ < kAskAgain_us) return;
     asked_us_ = monotonic_us;
@@ -110,7 +110,7 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
 
   void report_refused() {
     const std::uint64_t refused = host_->counts().refused();
-    // Told when the count has doubled: who floods does not fill LOG.
+    // Logged only when the count has doubled: a flood does not fill LOG.
     if (refused == 0 || refused < 2 * refused_) return;
     node_->report(
         wire::Reason::kClientRefused,

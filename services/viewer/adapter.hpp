@@ -1,4 +1,4 @@
-// The viewer on the bus, and its web server.
+// Connects the viewer to the bus, and its web server.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ struct ViewerChannels {
   std::string map_request = all.out("MAP_REQUEST", "asks for MAP where the viewer started late");
 };
 
-/// The process. In a replay it hears nothing and says nothing.
+/// The service. In a replay it receives and publishes nothing.
 bus::Service viewer_service(const ViewerChannels& channels = {});
 
 }  // namespace understory::viewer

@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kMostTogether = 64;  ///< Messages.
 constexpr std::size_t kMostBytes = std::size_t{4} << 20U;
 
-/// What a state is made from that somebody needs who comes later.
+/// Channels whose state a later client needs.
 constexpr std::array<std::string_view, 8> kStateChannels = {
     "MAP",         "MAP_DELTA",    "EXISTENCE",      "SUBMAP", "MAP_CORRECTION",
     "LOOP_RESULT", "LOOP_CLOSURE", "TRUTH_LANDMARKS"};

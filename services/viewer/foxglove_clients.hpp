@@ -1,4 +1,4 @@
-// Foxglove, Lichtblick and others of their protocol, beside the pages.
+// Clients with the Foxglove protocol (Foxglove, Lichtblick and others), beside the pages.
 #pragma once
 
 #include <cstdint>
@@ -14,40 +14,40 @@
 
 namespace understory::viewer {
 
-/// Sessions and the converter that feeds them. A client gets its next messages when it has taken
-/// those before; what it is too slow for its session drops and counts.
+/// Sessions and their converter. A client gets its next messages when it has received those before;
+/// its session drops and counts messages for which it is too slow.
 class FoxgloveClients {
  public:
   /// For the server: the path and its subprotocols.
   static web::SocketPath socket_path(std::vector<std::string> allowed_origins);
 
-  /// Whether a message of this channel is of any use now: what a client that comes later needs is
-  /// always heard, the rest where there is a client.
+  /// Whether a message of this channel is needed now: channels needed by later clients are always
+  /// received, others only if there is a client.
   bool wants(std::string_view channel) const;
-  /// Takes a message.
+  /// Adds a message.
   void hear(std::string_view channel, std::span<const std::uint8_t> bytes, std::int64_t wall_us);
 
-  /// Takes what happened to a client. A text: it is to be closed with that reason.
+  /// Handles an event of a client. A text: close the client with that reason.
   std::optional<std::string> take(const web::Event& event);
   /// A message for a client.
   struct Message {
     web::ClientId client = 0;
     foxglove::Outgoing outgoing;
   };
-  /// What is to be sent now.
+  /// The messages to send now.
   std::vector<Message> due();
 
-  /// Whether this client is one of them.
+  /// Whether this client uses the Foxglove protocol.
   bool has(web::ClientId client) const { return clients_.contains(client); }
-  /// Clients that look.
+  /// Number of clients.
   std::size_t size() const { return clients_.size(); }
-  /// Messages that clients were too slow for, so far, of those that are there.
+  /// Number of messages dropped for slow clients, over the present clients.
   std::uint64_t dropped() const;
 
  private:
   struct Client {
     foxglove::Session session;
-    bool is_busy = false;  ///< Sent messages are not with the operating system yet.
+    bool is_busy = false;  ///< The operating system has not taken all sent messages yet.
   };
   std::map<web::ClientId, Client> clients_;
   foxglove::Converter converter_;

@@ -37,7 +37,7 @@ void FrameWriter::add(const std::string& name, std::span<const double> values) {
 
 std::shared_ptr<const std::string> FrameWriter::message(nlohmann::ordered_json header) const {
   header["arrays"] = list_;
-  // Texts of processes may be anything: what is no UTF-8 is replaced.
+  // Texts of processes may contain any bytes: invalid UTF-8 is replaced.
   std::string text = header.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   text.append(padding(sizeof(std::uint32_t) + text.size()), ' ');
 

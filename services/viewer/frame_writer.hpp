@@ -1,4 +1,4 @@
-// The bytes of one message to a page: a JSON header and arrays behind it (protocol.md).
+// The bytes of one message to a page: a JSON header, followed by arrays (protocol.md).
 #pragma once
 
 #include <cstdint>

@@ -12,7 +12,7 @@ namespace understory::viewer {
 struct HierarchyOverlay {
   std::vector<std::uint32_t> from;
   std::vector<std::uint32_t> to;
-  std::vector<std::uint8_t> level;  ///< 1: of a polygon's boundary, 0: inside one.
+  std::vector<std::uint8_t> level;  ///< 1: on a polygon's boundary, 0: inside one.
 };
 
 /// Of the landmarks within 60 m of the vehicle, the 600 nearest at most: a few milliseconds.

@@ -6,7 +6,7 @@
 namespace understory::viewer {
 namespace {
 
-/// Less than this is not seen on a page [m].
+/// Smaller moves are not visible on a page [m].
 constexpr float kMoved_m = 0.002F;
 
 TrackPoint point_of(const model::KeyframePose& keyframe) {

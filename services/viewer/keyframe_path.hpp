@@ -10,18 +10,18 @@
 
 namespace understory::viewer {
 
-/// Keyframes in the order in which they were first heard of.
+/// Keyframes in the order in which they were first received.
 class KeyframePath {
  public:
   /// `changes` is the scene's counter and must outlive it.
   explicit KeyframePath(Change& changes) : track_(changes) {}
 
-  /// Takes poses of keyframes, new or known. O(given), and what lies behind the first that moved
-  /// is told to the page again.
+  /// Adds or updates poses of keyframes. O(given); the path is sent to the page again from the
+  /// first moved keyframe on.
   void take(std::span<const model::KeyframePose> keyframes);
-  /// Where a keyframe's base is; none where it is not known.
+  /// Pose of a keyframe's base; none if it is unknown.
   std::optional<geometry::SE2> find(std::uint64_t keyframe_sequence) const;
-  /// Nothing is known.
+  /// Removes all keyframes.
   void clear();
   /// For the page.
   const Track& track() const { return track_; }

@@ -13,7 +13,7 @@ constexpr double kRedraw_m = 0.05;
 }  // namespace
 
 void KnownTruth::take(model::Utime utime, const geometry::SE2& world_T_vehicle) {
-  // The newest one is kept whole, since poses are compared with it; of the others one in so much.
+  // The newest truth is kept in full, since poses are compared with it; older truth is thinned.
   const std::size_t size = world_truth_.size();
   if (size > 1 &&
       (world_truth_[size - 2].second.translation() - world_T_vehicle.translation()).norm() <
@@ -26,7 +26,7 @@ void KnownTruth::take(model::Utime utime, const geometry::SE2& world_T_vehicle) 
   world_truth_.emplace_back(utime, world_T_vehicle);
 }
 
-/// Between two that are near each other; none outside of what was heard.
+/// Interpolates between two neighbouring ones; none outside the time received.
 std::optional<geometry::SE2> KnownTruth::at(model::Utime utime) const {
   const auto after = std::ranges::lower_bound(world_truth_, utime, {},
                                               &std::pair<model::Utime, geometry::SE2>::first);
@@ -74,7 +74,7 @@ std::optional<TruthError> KnownTruth::compare(const model::SlamPose& pose) {
   return result;
 }
 
-/// The path so far: drawn anew when the alignment has moved it by more than is seen.
+/// Draws the path so far again if the alignment has moved it visibly.
 void KnownTruth::draw(const geometry::SE2& world_T_map, const geometry::SE2& map_T_vehicle) {
   const auto in_map = [&](const std::pair<model::Utime, geometry::SE2>& one) {
     const geometry::SE2 at = world_T_map.inverse() * one.second;

@@ -1,4 +1,4 @@
-// Ground truth beside the map: the true pose, the true path, the errors of poses.
+// Ground truth relative to the map: the true pose, the true path, the errors of poses.
 #pragma once
 
 #include <optional>
@@ -12,18 +12,18 @@
 
 namespace understory::viewer {
 
-/// How far a pose is from the truth at its time.
+/// Difference between a pose and the truth at its time.
 struct TruthError {
   double error_m = 0.0;
   double error_rad = 0.0;
-  std::optional<double> nees;  ///< None where the covariance is singular.
-  /// By the keyframe that began the map. The best fit of all poses is no truth: its own error
-  /// counts for the pose's.
+  std::optional<double> nees;  ///< None if the covariance is singular.
+  /// Aligned by the keyframe that began the map. The best fit of all poses is no truth: it contains
+  /// the pose's own error.
   bool is_tied = false;
 };
 
-/// The truth in the frame of the map. By the keyframe that began the map, whose pose defines its
-/// frame; where it is not known, by the alignment of all poses.
+/// The truth in the frame of the map. Aligned by the keyframe that began the map, whose pose
+/// defines its frame; if that is unknown, by the alignment of all poses.
 class KnownTruth {
  public:
   /// `changes` is the scene's counter and must outlive it.
@@ -31,14 +31,14 @@ class KnownTruth {
 
   /// A true pose, in order of time.
   void take(model::Utime utime, const geometry::SE2& world_T_vehicle);
-  /// Another map has another frame, which nobody knows yet.
+  /// Another map begins, in an unknown frame.
   void start_map();
   /// The keyframe that began the map.
   void tie(const model::MapUpdate& first);
-  /// A pose in the map: sets the true pose and draws the true path. None where the truth of its
-  /// time, or the map's frame, is not known.
+  /// Compares a pose in the map: sets the true pose and draws the true path. None if the truth at
+  /// that time, or the map's frame, is unknown.
   std::optional<TruthError> compare(const model::SlamPose& pose);
-  /// No truth was heard.
+  /// Removes the truth.
   void clear() { world_truth_.clear(); }
 
   /// The true path, frame map.

@@ -125,7 +125,7 @@ void LandmarkTable::unlink(Slot slot) {
 
 Slot LandmarkTable::first_after(const LandmarkCursor& cursor) const {
   if (cursor.change == 0) return first_;
-  // Where the last one that was read has not changed, the next one is its successor.
+  // If the last landmark read has not changed, the next one is its successor.
   if (cursor.slot < order_.size() && order_[cursor.slot].change == cursor.change)
     return order_[cursor.slot].after;
   Slot slot = kNone;

@@ -1,4 +1,4 @@
-// The landmarks of a map as a page shows them, and which of them changed since when.
+// The landmarks of a map for the page, with the time of each landmark's last change.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@
 
 namespace understory::viewer {
 
-/// Counts changes of a scene; each change has a number of its own.
+/// Counter of a scene's changes; each change has its own number.
 using Change = std::uint64_t;
-/// Place of a landmark in the page's arrays.
+/// Index of a landmark in the page's arrays.
 using Slot = std::uint32_t;
 
-/// One landmark, 4-byte numbers as the page draws them.
+/// One landmark, with 4-byte numbers as drawn by the page.
 struct SceneLandmark {
   /// Bits of `flags`.
   enum : std::uint8_t { kThere = 1, kCorner = 2, kOutOfUse = 4, kGiven = 8 };
@@ -34,38 +34,38 @@ struct SceneLandmark {
   std::uint8_t flags = 0;    ///< Without kThere the slot is empty.
 };
 
-/// How far a reader of a LandmarkTable has come.
+/// Position of a reader in a LandmarkTable.
 struct LandmarkCursor {
-  Change change = 0;  ///< Of the last landmark that it took.
-  Slot slot = 0;      ///< Where that was.
+  Change change = 0;  ///< Of the last landmark that it read.
+  Slot slot = 0;      ///< Slot of that landmark.
   bool operator==(const LandmarkCursor&) const = default;
 };
 
-/// Slots are given out in order and used again; a change costs O(1), reading what changed costs
-/// what changed. About 110 bytes per landmark.
+/// Slots are assigned in order and reused; a change costs O(1), reading costs the number of
+/// changes. About 110 bytes per landmark.
 class LandmarkTable {
  public:
   /// `changes` is the scene's counter and must outlive it.
   explicit LandmarkTable(Change& changes) : changes_(&changes) {}
 
-  /// Puts a landmark in or gives it new values; what is known of its existence stays.
+  /// Adds or updates a landmark; its existence stays.
   void set(const model::MapLandmark& landmark, bool is_given = false);
-  /// Sets whether it exists; one that is not in the table is passed over.
+  /// Sets whether it exists; a landmark that is not in the table is ignored.
   void set_existence(const model::LandmarkExistence& existence);
-  /// Takes it out; its slot is free.
+  /// Removes it and frees its slot.
   void remove(model::LandmarkId id);
-  /// Takes all out: slots begin anew.
+  /// Removes all: slots begin anew.
   void clear();
 
-  /// The landmark of this id; null where it is not in the table.
+  /// The landmark with this id; null if it is not in the table.
   const SceneLandmark* find(model::LandmarkId id) const;
   /// Its slot.
   std::optional<Slot> slot_of(model::LandmarkId id) const;
-  /// All slots that were given out; those without kThere are empty.
+  /// All assigned slots; those without kThere are empty.
   std::span<const SceneLandmark> slots() const { return landmarks_; }
-  /// Landmarks in the table.
+  /// Number of landmarks.
   std::size_t size() const { return slot_of_.size(); }
-  /// Of them, those out of use.
+  /// Number of landmarks out of use.
   std::size_t unused() const { return unused_; }
 
   /// The slots that changed since `cursor`, oldest change first, at most `most`; moves the cursor.

@@ -1,4 +1,4 @@
-// The viewer as a process: a web page on loopback. Its channels: scene_channels.hpp, and --help.
+// The viewer's process: a web page on loopback. Its channels: scene_channels.hpp, and --help.
 #include "services/viewer/adapter.hpp"
 
 int main(int argc, char** argv) {

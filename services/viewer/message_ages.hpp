@@ -1,4 +1,4 @@
-// How old messages are when they come.
+// Age of messages at their reception.
 #pragma once
 
 #include <algorithm>
@@ -10,22 +10,22 @@
 
 namespace understory::viewer {
 
-/// Stamps beside the wall clock at which they came. The least difference, of a fast sensor in the
-/// last 10 to 20 s, is no age: the clocks differ by it.
+/// Compares stamps with the wall clock at their reception. The least difference, of a fast sensor
+/// in the last 10 to 20 s, is the offset of the clocks, not an age.
 class MessageAges {
  public:
-  /// A message and when it came [us].
+  /// Adds a message and its reception time [us].
   void note(model::Utime utime, std::int64_t wall_us) {
     note(utime);
     newest_wall_us_ = std::max(newest_wall_us_, wall_us);
   }
-  /// A message of which that does not matter.
+  /// Adds a message without its reception time.
   void note(model::Utime utime) { utime_ = std::max(utime_, utime); }
-  /// A stamp of a fast sensor.
+  /// Adds a stamp of a fast sensor.
   void note_stamp(model::Utime utime, std::int64_t wall_us);
-  /// Age of a message that comes now; none before the first stamp.
+  /// Age of a message received now; none before the first stamp.
   std::optional<double> age_ms(model::Utime utime, std::int64_t wall_us) const;
-  /// No message came.
+  /// Removes all.
   void clear() { *this = {}; }
 
   /// Newest stamp, -1 before the first.

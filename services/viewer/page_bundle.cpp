@@ -2,7 +2,7 @@
 
 #include <array>
 
-// Symbols of page_files.S: the files as they were built, and where each ends.
+// Symbols of page_files.S: the built files, and the end of each.
 extern "C" {
 extern const char understory_page_index[];
 extern const char understory_page_index_end[];

@@ -1,4 +1,4 @@
-// The page's files, which are part of the program.
+// The page's files, compiled into the program.
 #pragma once
 
 #include <span>
@@ -14,7 +14,7 @@ struct PageFile {
   std::string_view content;
 };
 
-/// All of them; where the page was not built (no npm), a page that says so.
+/// All files; if the page was not built (no npm), a page with that information.
 std::span<const PageFile> page_files();
 /// Whether the page was built.
 bool has_page();

@@ -11,11 +11,11 @@ namespace {
 using PageJson = nlohmann::json;
 
 constexpr std::size_t kMostOnTheWay = 2;
-/// Without a pose, a frame comes every so many periods.
+/// Without a pose, a frame is sent every this many periods.
 constexpr std::int64_t kPeriodsWithoutPose = 3;
 constexpr double kLongestToScreen_ms = 60'000.0;
 
-/// Numbers, texts and truths of a message; what is of another type counts as missing.
+/// Numbers, texts and booleans of a message; a value of another type counts as missing.
 std::optional<std::uint64_t> unsigned_in(const PageJson& message, const char* key) {
   const auto found = message.find(key);
   if (found == message.end() || !found->is_number_unsigned()) return std::nullopt;
@@ -30,7 +30,7 @@ std::shared_ptr<const std::string> answer(const PageRequests& requests, const Pa
     header["story"] = requests.story(question);
     header["ok"] = true;
   } catch (const std::exception& error) {
-    // Also a question whose fields have other types.
+    // Also for a question with fields of other types.
     header["ok"] = false;
     header["error"] = error.what();
   }
@@ -92,7 +92,7 @@ void PageClients::acknowledge(Client& client, const PageJson& message) {
     const double ms = shown->get<double>() - sent->second;
     if (ms >= 0.0 && ms < kLongestToScreen_ms) to_screen_.add(static_cast<std::int64_t>(1e3 * ms));
   }
-  // Frames are shown in order: those before it were, too.
+  // Frames are shown in order: earlier ones were shown, too.
   client.on_the_way.erase(client.on_the_way.begin(), std::next(sent));
 }
 

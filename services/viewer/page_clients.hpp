@@ -1,4 +1,4 @@
-// The browsers that look at the viewer: who gets which frame when, and what they ask.
+// The browsers with an open page: frames to each, and requests from them.
 #pragma once
 
 #include <functional>
@@ -16,11 +16,12 @@
 
 namespace understory::viewer {
 
-/// What pages may want beside frames; each returns a refusal's text, or none.
+/// Requests of pages beside frames; each returns the text of a refusal, or none.
 struct PageRequests {
-  /// Answers a question with the object `story`. Throws std::runtime_error with why there is none.
+  /// Answers a question with the object `story`. Throws std::runtime_error with the reason if there
+  /// is none.
   std::function<nlohmann::ordered_json(const nlohmann::json& question)> story;
-  /// Play, pause, seek, choose a revision.
+  /// Plays, pauses, seeks, or selects a revision.
   std::function<void(const nlohmann::json& control)> control;
 };
 
@@ -30,33 +31,33 @@ struct PageMessage {
   std::shared_ptr<const std::string> bytes;
 };
 
-/// Flow control of all pages (protocol.md): two frames on their way at most, and the next one has
-/// what changed since. Poses set the pace: what else changed goes along with the next one, or after
-/// three periods, since each picture costs the browser the whole window. Pure: the caller has the
-/// sockets and the clock.
+/// Flow control of all pages (protocol.md): at most two frames are in transit, and the next one
+/// contains all changes since. Poses set the pace: other changes are sent with the next pose, or
+/// after three periods, since each picture makes the browser redraw the whole window. Pure: the
+/// caller has the sockets and the clock.
 class PageClients {
  public:
   /// `runs` must outlive it. `period_us`: least time between two frames of a client.
   PageClients(std::vector<const Scene*> runs, PageRequests requests, std::int64_t period_us);
 
-  /// A page has come; `hello` is its first message.
+  /// A page was opened; `hello` is its first message.
   PageMessage opened(web::ClientId client, const nlohmann::ordered_json& hello);
-  /// A page has gone.
+  /// A page was closed.
   void closed(web::ClientId client) { clients_.erase(client); }
-  /// A page said something. Gives answers; where it is not of the protocol, none but `refusal`:
-  /// the client is to be closed.
+  /// Handles a message of a page. Returns the answers; a message outside the protocol gives only
+  /// `refusal`: then close the client.
   std::vector<PageMessage> take(web::ClientId client, const std::string& text,
                                 std::optional<std::string>& refusal);
-  /// The frames that are due. `extra` is added to the header of each. `wall_us`: now, where the
-  /// runs are of logs; none: each run's newest message came when the run says.
+  /// The frames that are due. `extra` is added to the header of each. `wall_us`: the present time
+  /// for runs from logs; none: the reception time of each run's newest message.
   std::vector<PageMessage> frames(std::int64_t now_us, const nlohmann::ordered_json& extra,
                                   std::optional<std::int64_t> wall_us = std::nullopt);
 
-  /// Pages that look.
+  /// Number of open pages.
   std::size_t size() const { return clients_.size(); }
-  /// Pictures that were left out because a page was slow, of all pages so far.
+  /// Number of pictures skipped because a page was slow, over all pages so far.
   std::uint64_t skipped() const { return skipped_; }
-  /// From the newest message in a frame to the screen, as the pages say [us].
+  /// Latency from the newest message in a frame to the screen, reported by the pages [us].
   const bus::LatencyHistogram& to_screen() const { return to_screen_; }
 
  private:
@@ -66,8 +67,8 @@ class PageClients {
     std::map<std::uint64_t, double> on_the_way;  ///< By sequence: wall_ms.
     std::uint64_t sequence = 0;
     std::uint64_t skipped = 0;
-    std::int64_t last_us = 0;  ///< When it last got a frame, or missed one.
-    bool has_more = false;     ///< The last frame was a piece.
+    std::int64_t last_us = 0;  ///< Time of its last frame, sent or missed.
+    bool has_more = false;     ///< The last frame was incomplete.
     std::size_t next_run = 0;
   };
   void acknowledge(Client& client, const nlohmann::json& message);

@@ -48,7 +48,7 @@ nlohmann::ordered_json counts_json(const web::ServerCounts& counts) {
           {"overrun", counts.overrun}};
 }
 
-/// Where the port is taken, by another run on this computer, the next ones are tried.
+/// If another run on this computer uses the port, the next ones are tried.
 std::unique_ptr<web::Server> make_server(const PageParameters& parameters) {
   web::ServerOptions options = server_options(parameters);
   for (int tries_left = parameters.port == 0 ? 1 : kPorts;; --tries_left, ++options.port) {

@@ -1,4 +1,4 @@
-// The web server and what goes through it: our pages, and viewers of others.
+// The web server for the pages and for Foxglove clients.
 #pragma once
 
 #include <map>
@@ -13,36 +13,36 @@
 
 namespace understory::viewer {
 
-/// Where the page is served.
+/// Address and limits of the page.
 struct PageParameters {
   std::string address = "127.0.0.1";  ///< To listen on.
   int port = 7680;                    ///< Or one of the nine above it. 0: any free one.
   bool beyond_loopback = false;       ///< Other computers may connect.
   std::string host_names;             ///< Comma-separated names of this computer.
   std::string foxglove_origins = "https://app.foxglove.dev";  ///< Comma-separated.
-  double rate_hz = 20.0;                                      ///< Frames for one page, at most.
+  double rate_hz = 20.0;                                      ///< Frames per page, at most.
   int most_clients = 32;                                      ///< Connections.
 };
 
-/// Owns the server; attend() does what is due. One thread calls it.
+/// Owns the server; attend() handles everything due. Call it from one thread.
 class PageHost {
  public:
   /// Throws web::ServerError. `runs` must outlive it.
   PageHost(const PageParameters& parameters, std::vector<const Scene*> runs, PageRequests requests,
            nlohmann::ordered_json hello);
 
-  /// Readable when there is something to take in.
+  /// Readable when there is input.
   int file_descriptor() const { return server_->file_descriptor(); }
-  /// Takes what pages said and sends what is due; see PageClients::frames().
+  /// Handles messages of pages and sends due frames; see PageClients::frames().
   void attend(std::int64_t now_us, const nlohmann::ordered_json& extra = {},
               std::optional<std::int64_t> wall_us = std::nullopt);
-  /// For viewers of others: what the run hears.
+  /// The Foxglove clients: give them the run's messages.
   FoxgloveClients& foxglove() { return foxglove_; }
-  /// Where the page is.
+  /// Address of the page.
   std::string url() const;
   /// Counts of the server.
   web::ServerCounts counts() const { return server_->counts(); }
-  /// Pages that look, and what they miss.
+  /// The open pages, and their missed frames.
   const PageClients& pages() const { return pages_; }
 
  private:
@@ -56,7 +56,7 @@ class PageHost {
   PageClients pages_;
   FoxgloveClients foxglove_;
   std::unique_ptr<web::Server> server_;
-  std::int64_t told_us_ = -1'000'000;  ///< When /health.json was made.
+  std::int64_t told_us_ = -1'000'000;  ///< Time of the last /health.json.
 };
 
 }  // namespace understory::viewer

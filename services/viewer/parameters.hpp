@@ -1,4 +1,4 @@
-// What the viewer may be told.
+// Parameters of the viewer.
 #pragma once
 
 #include "services/viewer/page_host.hpp"
@@ -8,7 +8,7 @@ namespace understory::viewer {
 /// Of the process.
 struct ViewerParameters {
   PageParameters page;
-  int niceness = 10;              ///< Of the process: people wait for a page, vehicles for poses.
+  int niceness = 10;  ///< Of the process: poses for the vehicle have priority over the page.
   bool hears_sweeps = false;      ///< Joins the group of the sweeps.
   bool watches_processes = true;  ///< All processes run on this computer.
 };

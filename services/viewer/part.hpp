@@ -1,17 +1,17 @@
-// A part of a scene and when it last changed.
+// A part of a scene and its latest change.
 #pragma once
 
 #include "services/viewer/landmark_table.hpp"
 
 namespace understory::viewer {
 
-/// A part of the scene and the number of its latest change; 0 = there is none yet.
+/// A part of the scene and the number of its latest change; 0 = none yet.
 template <class T>
 struct Part {
   T value{};
   Change change = 0;
 
-  /// The value, to be changed now; `changes` is the scene's counter.
+  /// The value, for a change now; `changes` is the scene's counter.
   T& changed(Change& changes) {
     change = ++changes;
     return value;

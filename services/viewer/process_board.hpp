@@ -1,4 +1,4 @@
-// The latest HEALTH of every process, and whether the process is still there.
+// The latest HEALTH of every process, and whether it is still running.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@
 
 namespace understory::viewer {
 
-/// What the operating system says of a process on this computer.
+/// State of a process on this computer, from the operating system.
 struct ProcessSample {
   bool is_running = false;  ///< Neither ended nor stopped by a signal.
   double cpu_s = 0.0;       ///< Processor time used so far.
 };
 
-/// By name of the process.
+/// Processes by name.
 class ProcessBoard {
  public:
-  /// HEALTH comes once a second; who says nothing for longer is silent [us].
+  /// HEALTH is sent once a second; a process without it for longer is silent [us].
   static constexpr std::int64_t kSilent_us = 1'500'000;
 
   /// A process.
@@ -30,27 +30,27 @@ class ProcessBoard {
     bool has_ended = false;     ///< By the operating system.
     bool is_silent = false;
     std::optional<double> cpu_share;  ///< Of one processor, over the last second or more.
-    std::optional<double> cpu_s;      ///< When it was last looked at ...
-    std::int64_t cpu_us = 0;          ///< ... which was then.
+    std::optional<double> cpu_s;      ///< At the last sample ...
+    std::int64_t cpu_us = 0;          ///< ... and the time of that sample.
   };
 
   /// `changes` is the scene's counter and must outlive it.
   explicit ProcessBoard(Change& changes) : changes_(&changes) {}
 
-  /// Takes a message that was heard at `wall_us`.
+  /// Adds a message received at `wall_us`.
   void take(const health_t& health, std::int64_t wall_us);
-  /// Takes what the operating system says of a process.
+  /// Adds the operating system's state of a process.
   void take(const std::string& process, const ProcessSample& sample, std::int64_t wall_us);
-  /// Time passes: who is silent.
+  /// Marks silent processes at this time.
   void look(std::int64_t wall_us);
 
-  /// All of them.
+  /// All processes.
   const std::map<std::string, Entry>& entries() const { return entries_; }
   /// Number of the latest change.
   Change change() const { return change_; }
   /// Wall clock of the last look() [us].
   std::int64_t looked_us() const { return looked_us_; }
-  /// Nobody was heard.
+  /// Removes all processes.
   void clear();
 
  private:

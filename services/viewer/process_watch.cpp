@@ -12,7 +12,7 @@ ProcessSample look_at_process(std::int64_t pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
   std::string text;
   if (!file || !std::getline(file, text)) return {};
-  // The name, in brackets, may have spaces and brackets itself.
+  // The name, in brackets, may itself contain spaces and brackets.
   const auto end = text.rfind(')');
   if (end == std::string::npos) return {};
 

@@ -1,4 +1,4 @@
-// What the operating system knows of the processes on the bus.
+// State of the processes on the bus, from the operating system.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 namespace understory::viewer {
 
-/// Looks at one process of this computer. Where the computer does not know it, it does not run: a
-/// process of another computer has to be told apart by the caller.
+/// Reads the state of one process of this computer. An unknown process is reported as not running:
+/// the caller must exclude processes of other computers.
 ProcessSample look_at_process(std::int64_t pid);
 
 }  // namespace understory::viewer

@@ -9,7 +9,7 @@
 namespace understory::viewer {
 namespace {
 
-/// Ids are larger than what JSON's numbers hold: they come as text.
+/// Ids exceed the range of JSON's numbers: they are sent as text.
 model::LandmarkId asked_id(const nlohmann::json& question) {
   const auto text = question.at("id").get<std::string>();
   model::LandmarkId id = 0;

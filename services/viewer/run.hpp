@@ -1,4 +1,4 @@
-// One run: what a page shows of it, and what it tells on a click.
+// One run: its scene on the page, and its stories for clicks.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ class Run {
   explicit Run(const story::Limits& limits = {})
       : limits_(limits), stories_(std::make_unique<story::StoryBook>(limits)) {}
 
-  /// Takes a message of a channel of for_each_channel(), whose `take` goes with it.
+  /// Adds a message of a channel of for_each_channel(), with that channel's `take`.
   template <class T, class Take>
   void take(const T& value, const Take& take, std::int64_t wall_us) {
     take(scene_, value, wall_us);
@@ -27,15 +27,15 @@ class Run {
     } else if constexpr (std::is_same_v<T, model::PointSweep>) {
       stories_->take(value, false, wall_us);
     } else if constexpr (!std::is_same_v<T, typename wire::WireOf<T>::type>) {
-      // Of the values of common/model it takes those that it has a use for.
+      // The stories use only some of the values of common/model.
       stories_->take(value, wall_us);
     }
   }
 
-  /// The object `story` for a question of the protocol. Throws std::runtime_error with why there is
-  /// none.
+  /// The object `story` for a question of the protocol. Throws std::runtime_error with the reason
+  /// if there is none.
   nlohmann::ordered_json answer(const nlohmann::json& question) const;
-  /// As before the first message.
+  /// Resets to the state before the first message.
   void reset();
 
   Scene& scene() { return scene_; }

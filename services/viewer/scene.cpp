@@ -6,8 +6,8 @@ namespace understory::viewer {
 namespace {
 
 constexpr std::size_t kMostLogLines = 500;
-/// Of chi^2 with the 3 degrees of freedom of a pose, its 99.9 %: above it the covariance is said to
-/// be too small, until NEES is below kNeesBound again.
+/// 99.9 % of chi^2 with the 3 degrees of freedom of a pose: above it the covariance is reported as
+/// too small, until NEES is below kNeesBound again.
 constexpr double kTooSureNees = 16.3;
 
 }  // namespace
@@ -25,7 +25,7 @@ void Scene::reset() {
   pose_.clear();
 }
 
-/// Another map has another frame: nothing of the one before means anything in it.
+/// Another map has another frame: earlier positions are invalid in it.
 void Scene::start_map(std::uint32_t map_id) {
   map_.start(map_id);
   pose_.start_map();
@@ -48,7 +48,7 @@ void Scene::take(const model::SlamPose& pose, std::int64_t wall_us) {
   if (has_place(pose)) compare_with_truth(pose);
   pose_.judge(numbers_.value);
 
-  // How often poses come, and how late.
+  // Rate and latency of poses.
   SceneNumbers& numbers = changed(numbers_);
   if (const auto rate_hz = pose_.rate_hz()) numbers.rate_hz = rate_hz;
   if (const auto age_ms = ages_.age_ms(pose.utime, wall_us)) numbers.latency_ms = age_ms;

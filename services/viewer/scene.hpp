@@ -1,4 +1,4 @@
-// What the viewer knows of one run, as a page shows it.
+// The state of one run for display on a page.
 #pragma once
 
 #include <deque>
@@ -18,14 +18,14 @@
 
 namespace understory::viewer {
 
-/// What became of the latest keyframe.
+/// Result of the latest keyframe.
 struct SceneMatches {
   model::MapUpdate update;
 };
 
-/// Takes messages in the order in which they came, with the wall clock at which each came [us]
-/// (for a log: of its events). Memory is bounded by the map and by the limits of its parts; a
-/// message costs what it changes.
+/// Takes messages in order of reception, with the wall clock of each [us] (for a log: of its
+/// events). Memory is bounded by the map and by the limits of its parts; the cost of a message
+/// depends on what it changes.
 class Scene {
  public:
   Scene() = default;
@@ -42,13 +42,13 @@ class Scene {
   void take(const model::MapCorrection& correction) { map_.take(correction); }
   void take(const model::LoopClosure& closure) { closures_.take(closure); }
   void take(const model::LoopResult& result) { closures_.take(result); }
-  // What the sensor sees.
+  // Data of the sensors.
   void take(const model::LandmarkScan& scan, std::int64_t wall_us);
   void take(const model::PlanarScan& scan, const geometry::SE2& vehicle_T_sensor) {
     scan_.take(scan, vehicle_T_sensor);
   }
   void take(const model::PointSweep& part) { scan_.take(part); }
-  /// A stamp of a fast sensor: from its age follows how old others are.
+  /// A stamp of a fast sensor: the ages of other messages are relative to it.
   void take_stamp(model::Utime utime, std::int64_t wall_us) { ages_.note_stamp(utime, wall_us); }
   // Ground truth, processes, messages for people.
   void take_truth(model::Utime utime, const geometry::SE2& world_T_vehicle) {
@@ -62,11 +62,11 @@ class Scene {
                    std::span<const model::KeyframePose> keyframes) {
     map_.take_stored(landmarks, existence, keyframes);
   }
-  /// Whether the whole map should be asked for: none was heard, or changes were missed.
+  /// Whether the whole map must be requested: none was received, or changes were missed.
   bool wants_map() const { return map_.wants_whole(); }
-  /// Time passes: what is silent.
+  /// Detects silence at this time.
   void look(std::int64_t wall_us);
-  /// As before the first message; readers are told.
+  /// Resets to the state before the first message; readers are notified.
   void reset();
 
   // For the frames.
@@ -87,12 +87,12 @@ class Scene {
   const ProcessBoard& processes() const { return processes_; }
   ProcessBoard& processes() { return processes_; }
   const std::deque<Part<log_t>>& log() const { return log_; }
-  /// Where an end of a closure is; none where it is not known.
+  /// Position of an end of a closure; none if it is unknown.
   std::optional<Eigen::Vector2d> place_of(const model::LoopEnd& end) const {
     return map_.place_of(end);
   }
 
-  /// Newest stamp of what was taken, -1 before the first.
+  /// Newest stamp received, -1 before the first.
   model::Utime utime() const { return ages_.utime(); }
   /// Wall clock of the newest message [us].
   std::int64_t newest_wall_us() const { return ages_.newest_wall_us(); }

@@ -10,9 +10,9 @@
 
 namespace understory::viewer {
 
-/// How a channel is listened to.
+/// Properties of a channel.
 struct ChannelTraits {
-  bool is_bulk = false;            ///< Sweeps: heard on request only.
+  bool is_bulk = false;            ///< Sweeps: received on request only.
   bool is_from_many = false;       ///< Several senders number their messages on it.
   bool is_on_message_time = true;  ///< Its stamps are those of the sensors.
 };
@@ -43,7 +43,7 @@ void for_each_channel(Visit&& visit) {
   visit.template operator()<model::LoopResult>(
       "LOOP_RESULT", {}, [](Scene& scene, const auto& one, int64_t) { scene.take(one); });
 
-  // What the sensor sees.
+  // Data of the sensors.
   visit.template operator()<model::LandmarkScan>(
       "LANDMARKS", {}, [](Scene& scene, const auto& one, int64_t us) { scene.take(one, us); });
   visit.template operator()<lidar_scan_t>(
@@ -58,7 +58,7 @@ void for_each_channel(Visit&& visit) {
       "ODOMETRY", {},
       [](Scene& scene, const auto& one, int64_t us) { scene.take_stamp(one.utime, us); });
 
-  // For stories and for viewers of others; the scene has no use for them.
+  // For stories and for Foxglove clients; not used by the scene.
   const auto pass_over = [](Scene& /*scene*/, const auto& /*one*/, int64_t) {};
   visit.template operator()<model::Keyframe>("KEYFRAME", {}, pass_over);
   visit.template operator()<model::TrackedScan>("TRACKED_LANDMARKS", {}, pass_over);
@@ -67,7 +67,7 @@ void for_each_channel(Visit&& visit) {
   visit.template operator()<gnss_t>("GNSS", {}, pass_over);
   visit.template operator()<truth_landmarks_t>("TRUTH_LANDMARKS", {}, pass_over);
 
-  // Ground truth, and how the processes are.
+  // Ground truth, and the state of the processes.
   visit.template operator()<ground_truth_t>(
       "GROUND_TRUTH", {}, [](Scene& scene, const ground_truth_t& one, int64_t us) {
         scene.take_stamp(one.utime, us);

@@ -122,8 +122,7 @@ void add_scan(const Scene& scene, const FrameRequest& request, nlohmann::ordered
   writer.add("detection_kind", std::span<const std::uint8_t>(kinds));
 }
 
-/// Where the page holds a landmark that a keyframe should see; none where nobody expects that: the
-/// landmark is taken for gone.
+/// Slot of an expected landmark; none if the landmark is out of use and not expected.
 std::optional<Slot> slot_in_use(const LandmarkTable& table, model::LandmarkId id) {
   const auto slot = table.slot_of(id);
   if (slot && (table.slots()[*slot].flags & SceneLandmark::kOutOfUse) != 0) return std::nullopt;
@@ -190,7 +189,7 @@ std::shared_ptr<const std::string> make_frame(const Scene& scene, const FrameReq
   const Change before = cursor.change;
   const Change now = scene.change();
 
-  // What grows with the map, in bounded pieces.
+  // Parts that grow with the map, in bounded pieces.
   add_landmarks(scene.landmarks(), request, cursor.landmarks, header, writer);
   add_track(scene.driven(), "path", "path", now, request.most_points, cursor.driven, header,
             writer);
@@ -199,7 +198,7 @@ std::shared_ptr<const std::string> make_frame(const Scene& scene, const FrameReq
   add_track(scene.truth(), "truth_path", "truth", now, request.most_points, cursor.truth, header,
             writer);
 
-  // What is told whole.
+  // Parts that are sent as a whole.
   if (scene.scan().change > before) add_scan(scene, request, header, writer);
   if (scene.matches().change > before) {
     add_matches(scene, header, writer);

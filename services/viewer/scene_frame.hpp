@@ -1,4 +1,4 @@
-// What of a scene a page lacks, as a message.
+// The changes of a scene since a page's last frame, as a message.
 #pragma once
 
 #include <memory>
@@ -10,33 +10,34 @@
 
 namespace understory::viewer {
 
-/// What a page has of one scene.
+/// State of one scene at a page.
 struct SceneCursor {
-  Change change = 0;  ///< It has all parts (but landmarks and paths) as they were then.
+  Change change = 0;  ///< All parts (except landmarks and paths) are up to this change.
   LandmarkCursor landmarks;
   TrackCursor driven;
   TrackCursor keyframes;
   TrackCursor truth;
 };
 
-/// How a frame is made.
+/// Inputs of a frame.
 struct FrameRequest {
   std::size_t run = 0;
   std::uint64_t sequence = 0;
-  std::uint64_t skipped = 0;            ///< Pictures that this page missed.
-  std::int64_t wall_us = 0;             ///< When the newest of it came.
-  std::set<std::string> overlays;       ///< That the page asked for.
-  std::size_t most_landmarks = 20'000;  ///< A frame has at most so many; the next one goes on.
-  std::size_t most_points = 40'000;     ///< The same of paths.
+  std::uint64_t skipped = 0;       ///< Pictures that this page missed.
+  std::int64_t wall_us = 0;        ///< Reception time of its newest message.
+  std::set<std::string> overlays;  ///< Requested by the page.
+  std::size_t most_landmarks =
+      20'000;  ///< A frame contains at most this number; the next one continues.
+  std::size_t most_points = 40'000;  ///< The same for paths.
 };
 
-/// Whether the page lacks anything. O(1).
+/// Whether the page lacks any change. O(1).
 bool has_news(const Scene& scene, const SceneCursor& cursor);
-/// Whether the page lacks a pose of the vehicle, a verdict or everything. O(1).
+/// Whether the page lacks a pose of the vehicle, a verdict, or the whole scene. O(1).
 bool has_moved(const Scene& scene, const SceneCursor& cursor);
 
-/// The frame, and in `cursor` what the page has when it has taken it. `extra` is merged into the
-/// header. Costs what changed.
+/// The frame, and in `cursor` the page's state after it. `extra` is merged into the header. Cost:
+/// the changes.
 std::shared_ptr<const std::string> make_frame(const Scene& scene, const FrameRequest& request,
                                               const nlohmann::ordered_json& extra,
                                               SceneCursor& cursor);

@@ -7,11 +7,11 @@
 
 namespace understory::viewer {
 
-/// What became of a keyframe, without its lists.
+/// The result of a keyframe, without its lists.
 nlohmann::ordered_json matches_json(const model::MapUpdate& update);
 
-/// Adds to a header those parts that changed after `since`: pose, verdict, truth, submaps,
-/// closures, processes, numbers, log.
+/// Adds the parts that changed after `since` to a header: pose, verdict, truth, submaps, closures,
+/// processes, numbers, log.
 void add_parts(const Scene& scene, Change since, nlohmann::ordered_json& header);
 
 }  // namespace understory::viewer

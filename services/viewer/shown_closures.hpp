@@ -1,4 +1,4 @@
-// Loop closures and what became of them.
+// Loop closures and their results.
 #pragma once
 
 #include <cstdint>
@@ -10,24 +10,24 @@
 
 namespace understory::viewer {
 
-/// A loop closure and what became of it.
+/// A loop closure and its result.
 struct SceneClosure {
   model::LoopClosure closure;
   std::string status = "sent";
   std::string reason;
 };
 
-/// At most 20,000 of them: the one of the lowest number goes first.
+/// At most 20,000; beyond that the lowest number is dropped first.
 class ShownClosures {
  public:
   /// `changes` is the scene's counter and must outlive it.
   explicit ShownClosures(Change& changes) : changes_(&changes) {}
 
-  /// A closure, or one that is taken back.
+  /// Adds a closure, or its revocation.
   void take(const model::LoopClosure& closure);
-  /// What became of one; of another than these it is passed over.
+  /// Sets the result of a closure; ignored if the closure is unknown.
   void take(const model::LoopResult& result);
-  /// There are none.
+  /// Removes all.
   void clear();
 
   /// By number.

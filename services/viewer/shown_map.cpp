@@ -18,7 +18,7 @@ void ShownMap::take(const model::WholeMap& map) {
   if (!map.complete) return;
   version_ = map.version;
   wants_whole_ = false;
-  // What it does not list, and was not handed over, is gone.
+  // Landmarks that it does not list, and that were not handed over, were removed.
   std::vector<model::LandmarkId> gone;
   for (const SceneLandmark& one : landmarks_.slots()) {
     if ((one.flags & SceneLandmark::kThere) == 0 || submaps_.holds(one.id)) continue;

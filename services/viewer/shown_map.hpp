@@ -1,4 +1,4 @@
-// The map as the mapper tells it: landmarks, keyframes, submaps that were handed over.
+// The map from the mapper's messages: landmarks, keyframes, submaps that were handed over.
 #pragma once
 
 #include <map>
@@ -24,22 +24,22 @@ class ShownMap {
 
   /// Another map begins, or none is known (0).
   void start(std::uint32_t id);
-  /// The map so far has this number.
+  /// Sets the number of the present map.
   void set_id(std::uint32_t id) { id_ = id; }
-  /// Its number; 0 = not known.
+  /// Its number; 0 = unknown.
   std::uint32_t id() const { return id_; }
-  /// Whether the whole map should be asked for: none was heard, or changes were missed.
+  /// Whether the whole map must be requested: none was received, or changes were missed.
   bool wants_whole() const { return wants_whole_; }
-  /// Forget that one was heard.
+  /// Marks the map as incomplete.
   void want_whole() { wants_whole_ = true; }
   /// Whether this delta begins the map anew: call start() before take().
   bool is_restarted_by(const model::MapDelta& delta) const {
     return delta.base_version == 0 && version_ != 0;
   }
 
-  /// MAP, where it is complete.
+  /// MAP, if it is complete.
   void take(const model::WholeMap& map);
-  /// MAP_DELTA; one that is known already is passed over.
+  /// MAP_DELTA; a known one is ignored.
   void take(const model::MapDelta& delta);
   /// EXISTENCE.
   void take(const model::Existence& existence);
@@ -47,7 +47,7 @@ class ShownMap {
   void take(const model::Submap& submap);
   /// MAP_CORRECTION.
   void take(const model::MapCorrection& correction);
-  /// A keyframe that was placed.
+  /// Adds a localised keyframe.
   void take(const model::KeyframePose& keyframe) { keyframes_.take({&keyframe, 1}); }
   /// Landmarks and keyframes of a stored map, without a mapper.
   void take_stored(std::span<const model::MapLandmark> landmarks,
@@ -59,7 +59,7 @@ class ShownMap {
   const SubmapPlaces& submaps() const { return submaps_; }
   /// Number of the latest change of the submaps.
   Change submaps_change() const { return submaps_change_; }
-  /// Where an end of a closure is; none where it is not known.
+  /// Position of an end of a closure; none if it is unknown.
   std::optional<Eigen::Vector2d> place_of(const model::LoopEnd& end) const;
 
  private:

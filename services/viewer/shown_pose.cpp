@@ -10,13 +10,13 @@
 namespace understory::viewer {
 namespace {
 
-/// Poses that come slower than 3 Hz are silent after so many of their intervals, but not later than
+/// Poses at less than 3 Hz are silent after this number of their intervals, but at the latest after
 /// kLatestSilence_us.
 constexpr std::int64_t kSilentPose_us = 1'000'000;
 constexpr double kSilentIntervals = 3.0;
 constexpr std::int64_t kLatestSilence_us = 10'000'000;
-constexpr double kSigmas = 3.0;    ///< Of what is told to people.
-constexpr double kUnsure_m = 1.0;  ///< A standard deviation above it is said to be unsure.
+constexpr double kSigmas = 3.0;    ///< Of the values shown to people.
+constexpr double kUnsure_m = 1.0;  ///< A larger standard deviation counts as unsure.
 constexpr float kDrawEvery_m = 1.0F;
 constexpr double kDrawEvery_rad = 0.05;
 constexpr std::int64_t kDrawEvery_us = 1'000'000;
@@ -27,7 +27,7 @@ double largest_sigma_m(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, solver.eigenvalues()(1)));
 }
 
-/// How long no pose may come, by how many come usually.
+/// Longest time without a pose, from the usual rate.
 std::int64_t silent_after_us(std::optional<double> rate_hz) {
   if (!rate_hz) return kSilentPose_us;
   const double usual_us = kSilentIntervals * 1e6 / *rate_hz;
@@ -35,7 +35,7 @@ std::int64_t silent_after_us(std::optional<double> rate_hz) {
                     kLatestSilence_us);
 }
 
-/// Of the numbers of slam_pose2_t: whether a path is drawn the same at both.
+/// From the numbers of slam_pose2_t: whether the path is drawn the same for both.
 bool is_same_line(std::uint8_t a, std::uint8_t b) { return (a == 6) == (b == 6); }
 
 }  // namespace
@@ -71,7 +71,7 @@ void ShownPose::take(const model::SlamPose& pose, std::int64_t wall_us) {
   if (has_place(pose)) draw(pose);
 
   if (!times_us_.empty() && wall_us - times_us_.back() > kLatestSilence_us)
-    times_us_.clear();  // A gap says nothing of how often poses come.
+    times_us_.clear();  // A gap is not used for the rate of poses.
   times_us_.push_back(wall_us);
   while (times_us_.size() > 2 && wall_us - times_us_.front() > 3'000'000) times_us_.pop_front();
 }
@@ -83,7 +83,7 @@ std::optional<double> ShownPose::rate_hz() const {
   return static_cast<double>(times_us_.size() - 1) / span_s;
 }
 
-/// The newest pose is always the last point; of those behind it as many as the eye can tell apart.
+/// The newest pose is always the last point; earlier ones are thinned to visible distances.
 void ShownPose::draw(const model::SlamPose& pose) {
   const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
   const int status = pose.is_coasting ? 6 : pose.status ? static_cast<int>(*pose.status) : 5;

@@ -1,4 +1,4 @@
-// The newest pose, the path so far, and what a driver must know of them.
+// The newest pose, the path so far, and the verdict on the pose for the driver.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +13,22 @@
 
 namespace understory::viewer {
 
-/// What a driver must know of the pose.
+/// Quality of the pose, for the driver.
 struct Verdict {
-  /// The worse the later, but for kWaiting.
+  /// In order of severity, except kWaiting.
   enum class State : std::uint8_t { kWaiting, kOk, kUnsure, kLost, kSilent };
   State state = State::kWaiting;
   std::string text = "no pose yet";
-  std::int64_t since_utime = 0;  ///< [us] since when it is so.
+  std::int64_t since_utime = 0;  ///< [us] Time since which it holds.
 };
 
-/// As pages and scripts have it: waiting, ok, unsure, lost, silent.
+/// Names for pages and scripts: waiting, ok, unsure, lost, silent.
 const char* state_name(Verdict::State state);
 
-/// Whether a pose says where the vehicle is, be it by odometry alone.
+/// Whether a pose contains the vehicle's place, even from odometry alone.
 bool has_place(const model::SlamPose& pose);
 
-/// Draws the path and judges the pose.
+/// Draws the path and gives the verdict on the pose.
 class ShownPose {
  public:
   /// `changes` is the scene's counter and must outlive it.
@@ -36,25 +36,25 @@ class ShownPose {
     verdict_.changed(changes) = {};
   }
 
-  /// The next pose and when it came [us].
+  /// Adds the next pose and its reception time [us].
   void take(const model::SlamPose& pose, std::int64_t wall_us);
-  /// The verdict on that pose, beside its figures.
+  /// Updates the verdict on that pose from its numbers.
   void judge(const SceneNumbers& numbers);
-  /// How often poses come; none before two have come at different times.
+  /// Rate of poses; none before two were received at different times.
   std::optional<double> rate_hz() const;
-  /// Whether poses that came at this rate (none = unknown) have ended. The verdict is silent then,
-  /// since `utime`.
+  /// Whether poses with this rate (none = unknown) have stopped. Then the verdict is silent since
+  /// `utime`.
   bool falls_silent(std::int64_t wall_us, std::optional<double> rate_hz, model::Utime utime);
-  /// Another map has another frame.
+  /// Another map begins, in another frame.
   void start_map() { driven_.clear(); }
-  /// No pose has come.
+  /// Removes all poses.
   void clear();
 
   /// The newest pose.
   const Part<std::optional<model::SlamPose>>& pose() const { return pose_; }
-  /// What is said of it.
+  /// The verdict on it.
   const Part<Verdict>& verdict() const { return verdict_; }
-  /// The path by poses as they came.
+  /// The path of poses as received.
   const Track& driven() const { return driven_; }
 
  private:

@@ -35,7 +35,7 @@ void ShownScan::take(const model::PointSweep& part) {
   if (part.revolution != revolution_) now.points_m.clear();
   revolution_ = part.revolution;
   now.utime = part.utime;
-  // Of many points every n-th: a page shows the shape.
+  // Of many points every n-th: a page shows only the shape.
   const std::size_t step =
       1 + part.points.size() * std::max<std::size_t>(1, part.parts) / kMostScanPoints;
   for (std::size_t i = 0; i < part.points.size(); i += step)

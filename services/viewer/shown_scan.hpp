@@ -1,4 +1,4 @@
-// What the sensor sees now.
+// The latest data of the sensors.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace understory::viewer {
 
-/// What the sensor sees now.
+/// The latest data of the sensors.
 struct SceneScan {
   std::int64_t utime = 0;
   std::vector<std::array<float, 3>> points_m;  ///< Frame vehicle.
@@ -26,13 +26,13 @@ class ShownScan {
   /// `changes` is the scene's counter and must outlive it.
   explicit ShownScan(Change& changes) : changes_(&changes) {}
 
-  /// The detections of a scan.
+  /// Adds the detections of a scan.
   void take(const model::LandmarkScan& scan);
-  /// The points of a one-plane laser.
+  /// Adds the points of a one-plane laser.
   void take(const model::PlanarScan& scan, const geometry::SE2& vehicle_T_sensor);
-  /// The next points of a revolution; another one replaces those of the last.
+  /// Adds the next points of a revolution; a new revolution replaces the last.
   void take(const model::PointSweep& part);
-  /// Nothing is seen.
+  /// Removes all.
   void clear() { scan_.changed(*changes_) = {}; }
 
   /// For the page.

@@ -1,4 +1,5 @@
-// What the mapper handed over: it is in MAP and MAP_DELTA no more, but still part of the map.
+// Submaps that the mapper handed over: they are no longer in MAP and MAP_DELTA, but still part of
+// the map.
 #pragma once
 
 #include <unordered_map>
@@ -8,25 +9,25 @@
 
 namespace understory::viewer {
 
-/// A submap that was handed over, at its latest pose.
+/// A submap that was handed over, with its latest pose.
 struct SubmapPlace {
   geometry::SE2 map_T_submap;
   std::vector<model::MapLandmark> landmarks;  ///< Frame submap.
-  std::vector<Eigen::Vector2d> outline_m;     ///< Convex hull of them, frame submap.
+  std::vector<Eigen::Vector2d> outline_m;     ///< Their convex hull, frame submap.
 };
 
-/// Which landmarks are in which submap.
+/// Maps landmarks to submaps.
 class SubmapPlaces {
  public:
-  /// Takes a submap; gives back its landmarks in the frame map. One that is repeated gives none.
+  /// Adds a submap; returns its landmarks in the frame map. A repeated one returns none.
   std::vector<model::MapLandmark> take(const model::Submap& submap);
-  /// Takes where the submaps are; gives back the landmarks of those that moved.
+  /// Updates the submaps' poses; returns the landmarks of those that moved.
   std::vector<model::MapLandmark> take(const model::MapCorrection& correction);
-  /// The mapper holds it itself again, or it is gone.
+  /// The mapper has the landmark again, or it was removed.
   void comes_back(model::LandmarkId id);
   /// Whether a landmark is in a submap.
   bool holds(model::LandmarkId id) const { return submap_of_.contains(id); }
-  /// Nothing is handed over.
+  /// Removes all submaps.
   void clear();
   /// By id.
   const std::unordered_map<model::SubmapId, SubmapPlace>& places() const { return places_; }

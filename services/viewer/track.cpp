@@ -29,7 +29,7 @@ void Track::replace_from(std::size_t kept, std::span<const TrackPoint> points) {
 
 std::size_t Track::first_unread(const TrackCursor& cursor) const {
   std::size_t first = std::min(cursor.taken, points_.size());
-  // The rewrites after the cursor; the first of them reaches furthest back.
+  // The rewrites after the cursor; the first of them begins at the earliest point.
   const auto later = std::ranges::upper_bound(rewrites_, cursor.change, {}, &Rewrite::change);
   if (later != rewrites_.end()) first = std::min(first, later->first);
   return first;

@@ -1,4 +1,4 @@
-// A path that grows at its end and is sometimes told anew from somewhere on.
+// A path that grows at its end and is sometimes replaced from some point on.
 #pragma once
 
 #include <cstdint>
@@ -17,16 +17,16 @@ struct TrackPoint {
   float y_m = 0.0F;
   float theta_rad = 0.0F;
   float sigma_m = 0.0F;     ///< Largest standard deviation of the position; 0 = unknown.
-  std::uint8_t status = 0;  ///< As the page has them.
+  std::uint8_t status = 0;  ///< Number used by the page.
 };
 
-/// How far a reader of a Track has come.
+/// Position of a reader in a Track.
 struct TrackCursor {
   Change change = 0;
-  std::size_t taken = 0;  ///< Points that it has, as they were at `change`.
+  std::size_t taken = 0;  ///< Number of points that it has, in their state at `change`.
 };
 
-/// At most kMostPoints: then every second point of it is left out, and it is told anew.
+/// At most kMostPoints: beyond that every second point is removed, and the path is sent again.
 class Track {
  public:
   static constexpr std::size_t kMostRewrites = 1024;
@@ -37,18 +37,18 @@ class Track {
 
   /// Adds a point at the end.
   void append(const TrackPoint& point);
-  /// Gives the last point a new value; there is one.
+  /// Replaces the last point, which must exist.
   void replace_last(const TrackPoint& point) { replace_from(points_.size() - 1, {&point, 1}); }
-  /// Keeps the first `kept` points (at most those there are), and takes these behind them.
+  /// Keeps the first `kept` points (at most the existing ones), and appends these.
   void replace_from(std::size_t kept, std::span<const TrackPoint> points);
-  /// Empty again.
+  /// Removes all points.
   void clear() { replace_from(0, {}); }
 
   /// All points, in order of time.
   std::span<const TrackPoint> points() const { return points_; }
-  /// The first point that a reader does not have as it is now; points().size() where it has all.
+  /// The first point that a reader lacks in its present state; points().size() if there is none.
   std::size_t first_unread(const TrackCursor& cursor) const;
-  /// Whether a reader lacks something: points, or that there are fewer of them.
+  /// Whether a reader lacks a change: points, or their removal.
   bool has_changed_since(const TrackCursor& cursor) const {
     return first_unread(cursor) < points_.size() || cursor.taken > points_.size();
   }
@@ -56,7 +56,7 @@ class Track {
   Change change() const { return change_; }
 
  private:
-  /// From `first` on it was told anew at `change`.
+  /// The path from `first` on was replaced at `change`.
   struct Rewrite {
     Change change = 0;
     std::size_t first = 0;
@@ -65,8 +65,8 @@ class Track {
   Change* changes_;
   Change change_ = 0;
   std::vector<TrackPoint> points_;
-  /// Both members ascending: one that reaches further back replaces those before it. The oldest two
-  /// become one where there are too many: who has not read for so long gets more than it lacks.
+  /// Both members ascending: a rewrite from an earlier point replaces those before it. Beyond the
+  /// limit the oldest two are merged: a reader that is far behind gets more points than it lacks.
   std::deque<Rewrite> rewrites_;
 };
 

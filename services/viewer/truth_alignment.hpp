@@ -1,4 +1,4 @@
-// Ground truth beside a map whose frame nobody told the world.
+// Alignment of ground truth with a map in an unknown frame.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,15 +9,15 @@
 
 namespace understory::viewer {
 
-/// The rigid motion that takes the map's poses to the true ones with the least sum of squares, of
+/// The rigid motion that maps the map's poses to the true ones with the least sum of squares, over
 /// all pairs so far (Umeyama 1991, without scale). O(1) per pair.
 class TruthAlignment {
  public:
   /// Adds a pair of positions [m] at one time.
   void add(const Eigen::Vector2d& in_map_m, const Eigen::Vector2d& in_world_m);
-  /// No pairs.
+  /// Removes all pairs.
   void clear() { *this = {}; }
-  /// world_T_map; none before the pairs are spread over more than 1 m.
+  /// world_T_map; none until the pairs extend over more than 1 m.
   std::optional<geometry::SE2> world_T_map() const;
 
  private:

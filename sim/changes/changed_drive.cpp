@@ -36,7 +36,7 @@ TruePoint truth_of(const SurfacePoint& point, PointState state) {
   return truth;
 }
 
-/// Where each point of both copies is, without what the drive says.
+/// Positions of the points of both copies, without results of the drive.
 std::vector<TruePoint> true_points(const Stage& before, const Stage& after,
                                    std::span<const TrueThing> things) {
   const auto thing_state = [&](PointId id) {
@@ -71,7 +71,7 @@ TruePoint* find_point(std::vector<TruePoint>& points, PointId id) {
   return found != points.end() && found->id == id ? &*found : nullptr;
 }
 
-/// Counts the sights of all points, and says which are newly hidden.
+/// Counts the sights of all points, and marks the newly hidden ones.
 void count_sights(std::span<const CameraFrame> frames, std::vector<TruePoint>& points) {
   for (const CameraFrame& frame : frames) {
     for (const ExpectedPoint& expected : frame.expected) {

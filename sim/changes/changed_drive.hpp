@@ -1,4 +1,4 @@
-// The same path through an unchanged and a changed copy of a scene, with the truth beside.
+// The same path through an unchanged and a changed copy of a scene, with ground truth.
 #pragma once
 
 #include <cstdint>
@@ -14,58 +14,60 @@
 
 namespace understory::sim::changes {
 
-/// What became of a point, by the whole drive.
+/// State of a point over the whole drive.
 enum class PointState : std::uint8_t {
-  kPresent,      ///< Is where it was.
+  kPresent,      ///< At its place.
   kGone,         ///< Its thing was removed.
-  kMoved,        ///< Its thing was moved: it is gone where it was, and new where it is.
+  kMoved,        ///< Its thing was moved: gone at the old place, new at the present one.
   kNew,          ///< Its thing was added.
-  kNewlyHidden,  ///< Is where it was; visible in the unchanged scene from somewhere on the path, in
-                 ///< the copy from nowhere.
+  kNewlyHidden,  ///< At its place; visible in the unchanged scene from a part of the path, never in
+                 ///< the copy.
 };
 /// "present", "gone", "moved", "new", "newly_hidden".
 std::string_view to_string(PointState state);
-/// The state of this name; none for another.
+/// The state with this name; none for another.
 std::optional<PointState> point_state(std::string_view name);
 
 /// Truth of a point.
 struct TruePoint {
   PointId id = kNoPoint;
   PointState state = PointState::kPresent;
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< In the copy; where gone, before.
-  Eigen::Vector3d before_m = Eigen::Vector3d::Zero();    ///< In the unchanged scene; new: as above.
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< In the copy; if gone, the earlier one.
+  Eigen::Vector3d before_m =
+      Eigen::Vector3d::Zero();  ///< In the unchanged scene; if new, as above.
   Eigen::Vector3d normal = Eigen::Vector3d::UnitX();
-  Descriptor descriptor{};           ///< Without noise.
-  std::uint32_t frames_before = 0;   ///< In which it was visible in the unchanged scene.
-  std::uint32_t frames_visible = 0;  ///< In which it is visible in the copy, where it is now.
-  std::uint32_t frames_hidden = 0;   ///< In which it is newly hidden.
+  Descriptor descriptor{};          ///< Without noise.
+  std::uint32_t frames_before = 0;  ///< Frames in which it was visible in the unchanged scene.
+  std::uint32_t frames_visible =
+      0;  ///< Frames in which it is visible in the copy, at its present place.
+  std::uint32_t frames_hidden = 0;  ///< Frames in which it is newly hidden.
 };
 
-/// What the cameras and the truth say of one replay of the path. LIDAR and inertial unit are too
-/// large to be kept: see sensors().
+/// Camera data and truth of one replay of the path. LIDAR and inertial data are too large to be
+/// stored: see sensors().
 struct ChangedDrive {
   CameraParameters camera;
   std::vector<CameraFrame> frames;
   std::vector<TrueThing> things;  ///< Of both copies, in order of id.
   std::vector<TruePoint> points;  ///< Of both copies, in order of id.
 
-  /// The point with this id; null where there is none. O(log n).
+  /// The point with this id; null if there is none. O(log n).
   const TruePoint* find(PointId id) const;
 };
 
-/// A course and one changed copy of it. Same arguments, same drives.
+/// A course and one changed copy of it. The same arguments give the same drives.
 class Replay {
  public:
   /// An empty diff replays the unchanged copy.
   Replay(Course course, const Diff& diff, const TextureParameters& textures = {});
 
-  /// Poses of the camera's frames along the path, without looking: utime and world_T_body.
+  /// Poses of the camera's frames along the path, without images: utime and world_T_body.
   struct Stop {
     model::Utime utime = 0;
     Eigen::Isometry3d world_T_body = Eigen::Isometry3d::Identity();
   };
   std::vector<Stop> stops(const CameraParameters& camera) const;
-  /// A camera on the copy, for drives too long to be kept frame by frame. The replay must outlive
+  /// A camera in the copy, for drives too long to be stored frame by frame. The replay must outlive
   /// it.
   KeypointCamera look(const CameraParameters& camera, std::uint64_t seed) const;
   /// Replays the path with the camera. `progress` gets a share in [0, 1] and may throw.
@@ -88,8 +90,8 @@ class Replay {
   std::shared_ptr<const Stage> copy_;
 };
 
-/// Sensors that suit a scene: an inertial unit and a LIDAR of 16 beams; in a forest wheels and 32
-/// beams; no GNSS.
+/// Suitable sensors for a scene: an inertial unit and a LIDAR of 16 beams; in a forest wheels and
+/// 32 beams; no GNSS.
 SensorSuite suite_for(SceneKind kind);
 
 }  // namespace understory::sim::changes

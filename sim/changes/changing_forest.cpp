@@ -9,7 +9,7 @@
 namespace understory::sim::changes {
 namespace {
 
-/// Notes where each tree stands, drive by drive.
+/// Records in which drives each tree stands.
 class TreeLedger {
  public:
   void note(const BuiltScene& built, int drive) {
@@ -34,8 +34,8 @@ model::Utime start_of(int drive, double days_between) {
   return static_cast<model::Utime>(std::llround(drive * days_between * kDay));
 }
 
-/// Pieces of 2 m along the outer side of a path that turns, where nothing grows; from one of its
-/// thirds on, by seed.
+/// Pieces of 2 m along the outer side of a curved path, in free space; starting at one of its
+/// thirds, by seed.
 std::vector<Box> stack_of(const Course& course, double length_m, std::uint64_t seed) {
   constexpr double kPiece_m = 2.0, kThick_m = 0.4, kHigh_m = 3.0;
   constexpr double kAside_m = 1.75;

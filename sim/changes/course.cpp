@@ -17,9 +17,9 @@ namespace {
 using std::numbers::pi;
 using Pose6 = UniformSpline<6>::Vector;
 
-constexpr double kPlaceSpacing = 0.25;  ///< Of the path, where room is looked for [m].
+constexpr double kPlaceSpacing = 0.25;  ///< Of the path, in the search for free space [m].
 
-/// How many things of each kind are put into a scene.
+/// Number of things of each kind in a scene.
 struct Furnishing {
   ThingKind kind;
   int count;
@@ -29,7 +29,7 @@ void furnish(Scene& scene, FreeSpace& space, std::span<const Furnishing> furnish
              std::mt19937_64& random) {
   for (const Furnishing& furnishing : furnishings) {
     for (int i = 0; i < furnishing.count; ++i) {
-      // A full room stays as it is.
+      // A full room gets no more things.
       if (auto thing = place(scene, furnishing.kind, space, random)) scene.add(std::move(*thing));
     }
   }
@@ -71,13 +71,13 @@ void add_room(Scene& scene) {
   scene.add(structure_of(ceiling, ceiling));
 }
 
-/// Evens out jumps of speed at the ends: from 0 to 1 with no speed and no acceleration there.
+/// Smooth ramp from 0 to 1, with zero speed and acceleration at the ends.
 double eased(double share) {
   const double x = std::clamp(share, 0.0, 1.0);
   return x * x * x * (10.0 + x * (6.0 * x - 15.0));
 }
 
-/// Turns of the gaze along the way, which a body that flies is free to make.
+/// Rotations of the gaze along the path, which a flying body can make.
 Pose6 gazing(const Eigen::Vector3d& at_m, double heading_rad, double along_m) {
   Pose6 pose;
   const double yaw = heading_rad + 0.8 * std::sin(2.0 * pi * along_m / 5.3);
@@ -86,7 +86,7 @@ Pose6 gazing(const Eigen::Vector3d& at_m, double heading_rad, double along_m) {
   return pose;
 }
 
-/// A path by the distance covered, flown at `speed_mps` with gentle ends.
+/// A path by distance, at `speed_mps` with smooth ends.
 template <typename PoseAt>
 RecordedPath flown(double length_m, const CourseParameters& parameters, PoseAt pose_at) {
   RecordedPath path;
@@ -95,7 +95,7 @@ RecordedPath flown(double length_m, const CourseParameters& parameters, PoseAt p
   const double flight_s = length_m / speed_mps + ramp_s;
   const auto count = static_cast<int>((flight_s + 2.0 * parameters.standstill_s) / path.step_s);
 
-  // Speed is that of cruising but for a ramp at each end; distance is its running sum.
+  // The speed is constant except for a ramp at each end; the distance is its running sum.
   double along_m = 0.0;
   for (int k = 0; k < count; ++k) {
     const double t = k * path.step_s - parameters.standstill_s;
@@ -106,7 +106,7 @@ RecordedPath flown(double length_m, const CourseParameters& parameters, PoseAt p
   return path;
 }
 
-/// Round the room, 2.2 m from its walls, at the height of a head.
+/// Around the room, 2.2 m from its walls, at the height of a head.
 RecordedPath round_the_room(const Scene& scene, const CourseParameters& parameters) {
   const double inside_m = 2.2;
   const Eigen::Vector2d middle = 0.5 * (scene.low_m + scene.high_m).head<2>();
@@ -140,7 +140,7 @@ RecordedPath along_the_module(const Scene& scene, const CourseParameters& parame
     const double x = middle.x() - reach_m * std::cos(angle);
     const double y = middle.y() - aside_m * std::sin(angle);
     const double z = middle.z() + 0.2 * std::sin(2.0 * angle);
-    // It looks ahead but at the ends, where it turns round.
+    // It looks ahead except at the ends, where it turns round.
     const double lap = std::floor(angle / (2.0 * pi));
     const double share = angle / (2.0 * pi) - lap;
     const double turned =
@@ -216,7 +216,7 @@ RecordedPath driven(const Route& route, const Ground& ground, const CourseParame
   return path;
 }
 
-/// Trunks where the forest has them, but for the path; then what stands between them.
+/// Trunks at the forest's positions, except on the path; then things between them.
 void plant(Scene& scene, const ForestParameters& kind, FreeSpace& space, std::mt19937_64& random) {
   const ForestWorldParameters plants;
   for (const Eigen::Vector2d& at : make_forest(kind, random).trunks_m) {

@@ -157,7 +157,7 @@ DataSetWriter::DataSetWriter(std::filesystem::path folder, DataSetInfo info)
 
 DataSetWriter::~DataSetWriter() {
   if (is_whole_) return;
-  std::error_code ignored;  // a destructor has nobody to tell
+  std::error_code ignored;  // a destructor cannot report errors
   for (int copy = 0; copy < copies_; ++copy)
     std::filesystem::remove_all(folder_ / copy_name(copy), ignored);
   std::filesystem::remove(folder_ / kReadMeName, ignored);

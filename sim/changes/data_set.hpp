@@ -1,4 +1,4 @@
-// Changed drives as a folder of files that others can read: README.txt in it explains each.
+// Changed drives as a folder of files for other programs: its README.txt explains each.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,11 @@
 
 namespace understory::sim::changes {
 
-/// What a data set says of itself.
+/// Description of a data set.
 struct DataSetInfo {
   SceneKind scene = SceneKind::kOffice;
   std::uint64_t seed = 0;
-  double share = 0.0;  ///< Of the things that were changed in each copy but the first.
+  double share = 0.0;  ///< Of the things changed in each copy but the first.
   double move_m = 0.0;
   CameraParameters camera;
 };
@@ -26,11 +26,11 @@ struct DataSetFile {
   std::uint64_t bytes = 0;  ///< Its size.
 };
 
-/// Writes a data set, whole or not at all: manifest.json comes last, and without commit() the
-/// copies are removed again.
+/// Writes a data set, as a whole or not at all: manifest.json is written last, and without commit()
+/// the copies are removed again.
 class DataSetWriter {
  public:
-  /// Makes the folder. Throws io::DataError where it cannot be made or is not empty.
+  /// Creates the folder. Throws io::DataError if it cannot be created or is not empty.
   DataSetWriter(std::filesystem::path folder, DataSetInfo info);
   ~DataSetWriter();
   DataSetWriter(const DataSetWriter&) = delete;
@@ -39,9 +39,9 @@ class DataSetWriter {
   /// Writes the tables and the cloud of the next copy; the first one is the unchanged one. Throws
   /// io::DataError.
   void add(const ChangedDrive& drive, const Stage& copy);
-  /// Where a further file of the copy added last goes, e.g. "drive.lcm".
+  /// Path for a further file of the latest copy, e.g. "drive.lcm".
   std::filesystem::path path_in_copy(std::string_view name) const;
-  /// Notes a further file of the copy added last, which has been written.
+  /// Records a further file of the latest copy after it was written.
   void add_file(std::string_view name);
   /// Writes README.txt and the manifest. Throws io::DataError.
   void commit();
@@ -59,19 +59,19 @@ class DataSetWriter {
 /// Reads a data set.
 class DataSetReader {
  public:
-  /// Reads the manifest. Throws io::DataError where there is none, or where it is not one.
+  /// Reads the manifest. Throws io::DataError if it is missing or invalid.
   explicit DataSetReader(std::filesystem::path folder);
 
-  /// What it says of itself.
+  /// Its description.
   const DataSetInfo& info() const { return info_; }
-  /// Number of copies, the unchanged one included.
+  /// Number of copies, including the unchanged one.
   int copies() const { return copies_; }
   /// All files but the manifest.
   const std::vector<DataSetFile>& files() const { return files_; }
-  /// The drive of a copy. Throws io::DataError naming file and line; a file whose size is not that
-  /// of the manifest is refused by its name.
+  /// The drive of a copy. Throws io::DataError with file and line; a file whose size differs from
+  /// the manifest is refused by its name.
   ChangedDrive drive(int copy) const;
-  /// A file of a copy, by the size in the manifest whole. Throws io::DataError.
+  /// A file of a copy, with the size checked against the manifest. Throws io::DataError.
   std::filesystem::path whole_file(int copy, std::string_view name) const;
 
  private:

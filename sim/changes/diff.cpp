@@ -15,7 +15,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kDiffSpacing = 0.25;  ///< Of the path, where room is looked for [m].
+constexpr double kDiffSpacing = 0.25;  ///< Of the path, in the search for free space [m].
 constexpr int kTriesForOccluder = 4000;
 constexpr std::array<std::string_view, 4> kStateNames{"present", "gone", "moved", "new"};
 
@@ -29,7 +29,7 @@ class DiffMaker {
     diff_.next_id = first_id > 0 ? first_id : course.scene.next_id;
   }
 
-  /// Chooses by lot what is removed and what is moved.
+  /// Selects at random what is removed and what is moved.
   void change(const DiffParameters& parameters) {
     std::vector<const Thing*> chosen;
     for (const Thing& thing : scene_.things) {
@@ -77,7 +77,7 @@ class DiffMaker {
   Diff take() { return std::move(diff_); }
 
  private:
-  /// The space that it leaves stays taken: whoever maps both would not tell them apart.
+  /// Its old space stays occupied: a map of both places could not distinguish them.
   bool move(const Thing& thing, double by_m) {
     for (int i = 0; i < 64; ++i) {
       const double bearing = uniform(random_, -pi, pi);
@@ -94,7 +94,7 @@ class DiffMaker {
     return false;
   }
 
-  /// A short move overlaps the place that the thing leaves, which must not count.
+  /// A short move overlaps the thing's old place, which must be ignored.
   bool has_room_beside_itself(const Thing& there) const {
     const double clearance = space_.clearance_m();
     const bool is_in_way = std::any_of(
@@ -119,7 +119,7 @@ class DiffMaker {
   const Scene& scene_;
   FreeSpace space_;
   std::mt19937_64 random_;
-  std::vector<Box> placed_;  ///< What is new, and what was moved.
+  std::vector<Box> placed_;  ///< New and moved things.
   Diff diff_;
 };
 
@@ -141,8 +141,8 @@ std::vector<NearTree> trees_by_distance(const Scene& scene, const Eigen::Vector2
   return trees;
 }
 
-/// Trees that a box hides from at least one place of the path within 25 m of it, at the height of
-/// its middle.
+/// Number of trees that a box hides from at least one point of the path within 25 m of it, at the
+/// height of its middle.
 int hidden_trees(const Box& box, std::span<const NearTree> trees,
                  std::span<const Eigen::Vector3d> path_m) {
   constexpr double kNear = 25.0;
@@ -162,7 +162,7 @@ int hidden_trees(const Box& box, std::span<const NearTree> trees,
   return count;
 }
 
-/// The lorry, of many drawn, that comes nearest to hiding `wanted` of the trees.
+/// The random lorry whose number of hidden trees is nearest to `wanted`.
 Thing best_lorry(const Scene& scene, DiffMaker& maker, std::span<const NearTree> trees,
                  int wanted) {
   constexpr int kTries = 300;
@@ -186,7 +186,7 @@ Diff make_diff(const Course& course, const DiffParameters& parameters, std::uint
                ThingId first_id) {
   DiffMaker maker(course, seed, first_id);
   maker.change(parameters);
-  // They need more room than anything else.
+  // Occluders need more room than other things.
   maker.add_occluders(parameters.occluders);
   maker.add(parameters.added_share);
   return maker.take();

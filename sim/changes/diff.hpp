@@ -1,4 +1,4 @@
-// What differs between a scene and a changed copy of it.
+// Difference between a scene and a changed copy of it.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,47 +23,47 @@ struct Diff {
   std::vector<ThingId> removed;    ///< Ascending.
   std::vector<Move> moved;         ///< Ascending by thing.
   std::vector<Thing> added;        ///< With ids that are new.
-  std::vector<Thing> occluders;    ///< Added, too: to hide what stays.
-  ThingId next_id = kGroundThing;  ///< Free in the changed copy.
+  std::vector<Thing> occluders;    ///< Added to hide unchanged things.
+  ThingId next_id = kGroundThing;  ///< First free id in the changed copy.
 };
 
-/// How much is changed.
+/// Amount of change.
 struct DiffParameters {
-  double share = 0.2;        ///< Of the things that can change: removed or moved, in [0, 1].
-  double moved_share = 0.4;  ///< Of the changed things that can be moved: moved.
+  double share = 0.2;        ///< Of the changeable things: removed or moved, in [0, 1].
+  double moved_share = 0.4;  ///< Of the changed movable things: moved.
   double move_m = 0.5;       ///< In the plan.
   double added_share = 1.0;  ///< New things per removed one.
   int occluders = 2;
-  std::optional<ThingKind> only;  ///< The one kind that can change; none: all.
+  std::optional<ThingKind> only;  ///< The only kind that changes; none: all.
 };
 
-/// Draws a diff. Exactly round(share * changeable things) things are removed or moved; a thing for
-/// which there is no room at the distance asked for is removed instead. New things and occluders
-/// are as many as there is room for. The ids of what is new begin at `first_id`, or where that is 0
-/// at scene.next_id: several copies of one scene want different ones.
+/// Draws a random diff. Exactly round(share * changeable things) things are removed or moved; a
+/// thing without room at the given distance is removed instead. New things and occluders are added
+/// as far as there is room. Ids of new things begin at `first_id`, or if that is 0 at
+/// scene.next_id: several copies of one scene need different ones.
 Diff make_diff(const Course& course, const DiffParameters& parameters, std::uint64_t seed,
                ThingId first_id = 0);
 
-/// A patch of the forest that was felled, with a lorry beside it.
+/// A felled patch of the forest, with a lorry beside it.
 struct ClearCutParameters {
-  int felled = 50;            ///< Trees that are nearest to the middle of the patch.
-  int hidden = 20;            ///< Trees behind the lorry, of those that stay.
+  int felled = 50;            ///< The trees nearest to the middle of the patch.
+  int hidden = 20;            ///< Trees hidden by the lorry, of the remaining ones.
   double from_path_m = 12.0;  ///< Of the middle of the patch.
 };
-/// Fells neighbours and parks the lorry between the path and other trees, of which it is placed to
-/// hide as many as it can up to `hidden`. Throws std::runtime_error where there are not as many
-/// trees or no room for a lorry.
+/// Fells neighbouring trees and parks the lorry between the path and other trees, where it hides as
+/// many as possible, up to `hidden`. Throws std::runtime_error if there are too few trees or no
+/// room for a lorry.
 Diff make_clear_cut(const Course& course, const ClearCutParameters& parameters, std::uint64_t seed,
                     ThingId first_id = 0);
 
-/// The changed copy. What the diff names and is not there is passed over.
+/// The changed copy. Things of the diff that do not exist are ignored.
 Scene changed(const Scene& scene, const Diff& diff);
 
-/// What became of a thing.
+/// Change of a thing.
 enum class ThingState : std::uint8_t { kPresent, kGone, kMoved, kNew };
 /// "present", "gone", "moved", "new".
 std::string_view to_string(ThingState state);
-/// The state of this name; none for another.
+/// The state with this name; none for another.
 std::optional<ThingState> thing_state(std::string_view name);
 
 /// A thing of either copy.
@@ -71,10 +71,10 @@ struct TrueThing {
   ThingId id = kGroundThing;
   ThingKind kind = ThingKind::kEquipment;
   ThingState state = ThingState::kPresent;
-  Eigen::Vector3d by_m = Eigen::Vector3d::Zero();      ///< How far it was moved.
-  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< In the copy; where it is gone, before.
+  Eigen::Vector3d by_m = Eigen::Vector3d::Zero();      ///< Its displacement.
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< In the copy; if gone, the earlier one.
 };
-/// All things of both, in order of id.
+/// All things of both copies, in order of id.
 std::vector<TrueThing> compare(const Scene& before, const Scene& after);
 
 }  // namespace understory::sim::changes

@@ -65,7 +65,7 @@ bool flag(const TableReader& row, std::size_t column) {
   return value == 1;
 }
 
-/// Goes along the frames as the rows of a table name them, in order of time.
+/// Follows the frames in the order of a table's rows, by time.
 class FrameCursor {
  public:
   explicit FrameCursor(std::vector<CameraFrame>& frames) : frames_(frames) {}

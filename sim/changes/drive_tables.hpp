@@ -1,4 +1,4 @@
-// A changed drive as tables of text, and back. Values come back as they were, but for the last
+// A changed drive as tables of text, and back. Values are read back exactly, except for the last
 // digit of a rotation.
 #pragma once
 
@@ -13,9 +13,9 @@ namespace understory::sim::changes {
 
 /// Columns: utime, position and rotation (unit quaternion) of world_T_camera, for every frame.
 std::string text_of_poses(std::span<const CameraFrame> frames);
-/// What the detector gives, without any id.
+/// Output of the detector, without ids.
 std::string text_of_keypoints(std::span<const CameraFrame> frames);
-/// Object and point behind each keypoint; 0 = none.
+/// Object and point of each keypoint; 0 = none.
 std::string text_of_segmentation(std::span<const CameraFrame> frames);
 /// The points that each frame could have shown.
 std::string text_of_expected(std::span<const CameraFrame> frames);
@@ -24,7 +24,7 @@ std::string text_of_points(std::span<const TruePoint> points);
 /// Truth of all things.
 std::string text_of_things(std::span<const TrueThing> things);
 
-/// The texts of one drive; `source` of each is named in errors.
+/// The texts of one drive; errors contain the `source` of each.
 struct DriveTexts {
   struct Text {
     std::string text;
@@ -32,9 +32,8 @@ struct DriveTexts {
   };
   Text poses, keypoints, segmentation, expected, points, things;
 };
-/// The drive that was written. Throws io::DataError with file and line for whatever is not as it
-/// should be: headings, numbers, names, stamps that no frame has, rows out of order, tables that
-/// disagree.
+/// The drive from its texts. Throws io::DataError with file and line for any error: headings,
+/// numbers, names, stamps without a frame, rows out of order, tables that disagree.
 ChangedDrive parse_drive(const DriveTexts& texts, const CameraParameters& camera);
 
 }  // namespace understory::sim::changes

@@ -15,10 +15,10 @@ constexpr std::array<std::string_view, 5> kSightNames{"visible", "hidden", "newl
                                                       "new"};
 /// A surface this much nearer than the point is in front of it [m].
 constexpr double kInFront = 0.01;
-/// Rays are cast this far beyond the point, to say what is there instead [m].
+/// Rays are cast this far beyond the point, to find what is there instead [m].
 constexpr double kBeyond = 30.0;
 
-/// Independent uses of chance for one point in one frame.
+/// Independent random numbers for one point in one frame.
 enum PointChance : std::uint64_t { kRecall = 1, kPixelU, kPixelV, kDisparity, kBits, kLeaves };
 
 struct FirstSurface {
@@ -27,7 +27,7 @@ struct FirstSurface {
   bool is_in_front = false;
 };
 
-/// What the line of sight to a point meets first.
+/// The first surface on the line of sight to a point.
 FirstSurface first_surface(RayCaster& caster, const BuiltScene& built,
                            const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m,
                            std::uint64_t luck) {
@@ -39,7 +39,7 @@ FirstSurface first_surface(RayCaster& caster, const BuiltScene& built,
   return {hit.range_m, built.thing_of(hit.object), hit.range_m < distance - kInFront};
 }
 
-/// Detectors give positions in steps of this.
+/// Quantisation of a detector's positions.
 double in_steps(double px) {
   constexpr double kPerPixel = 64.0;
   return std::round(kPerPixel * px) / kPerPixel;
@@ -105,7 +105,7 @@ CameraParameters camera_for(SceneKind kind) {
   return camera;
 }
 
-/// A camera at its place.
+/// A camera at its pose.
 struct KeypointCamera::Look {
   Eigen::Isometry3d world_T_camera;
   Eigen::Isometry3d camera_T_world;
@@ -168,7 +168,7 @@ bool KeypointCamera::detect(const Look& look, const SurfacePoint& point, CameraF
   return true;
 }
 
-/// The points of the unchanged scene, whatever became of them.
+/// The points of the unchanged scene, in any state.
 void KeypointCamera::add_known(const Look& look, CameraFrame& frame) {
   for (const SurfacePoint& point : unchanged_.points) {
     if (!is_in_view(look, point)) continue;
@@ -199,7 +199,7 @@ void KeypointCamera::add_known(const Look& look, CameraFrame& frame) {
   }
 }
 
-/// Points that are new, or where they were not before.
+/// New points, and points at a new place.
 void KeypointCamera::add_new(const Look& look, CameraFrame& frame) {
   for (const std::size_t i : new_points_) {
     const SurfacePoint& point = copy_.points[i];

@@ -1,4 +1,4 @@
-// A stereo camera whose images are already keypoints.
+// A stereo camera that gives keypoints instead of images.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,8 +15,8 @@
 
 namespace understory::sim::changes {
 
-/// A rectified pair of pinhole cameras and the detector behind it. Frame `camera`: x to the right,
-/// y down, z ahead, origin in the left one; the right one is `baseline_m` along x.
+/// A rectified pair of pinhole cameras with its detector. Frame `camera`: x to the right, y down, z
+/// ahead, origin in the left one; the right one is `baseline_m` along x.
 struct CameraParameters {
   int width_px = 640;
   int height_px = 480;
@@ -24,12 +24,13 @@ struct CameraParameters {
   double baseline_m = 0.12;
   double rate_hz = 5.0;
   double near_m = 0.4;            ///< Along z.
-  double far_m = 12.0;            ///< Along z; farther points are too small to be found again.
+  double far_m = 12.0;            ///< Along z; farther points are too small for the detector.
   double most_oblique_rad = 1.2;  ///< Between normal and line of sight.
 
-  double recall = 0.9;             ///< Share of the visible points that a frame detects.
-  double recall_loss_far = 0.0;    ///< Of it, how much is lost at far_m (linear in the distance).
-  double false_per_frame = 5.0;    ///< Mean number of keypoints that are no point.
+  double recall = 0.9;  ///< Share of the visible points that a frame detects.
+  double recall_loss_far =
+      0.0;  ///< Share of `recall` that is lost at far_m (linear in the distance).
+  double false_per_frame = 5.0;    ///< Mean number of keypoints without a point.
   double pixel_sigma = 0.6;        ///< Per axis [px].
   double disparity_sigma = 0.6;    ///< [px]
   double flip_rate = 0.06;         ///< Share of a descriptor's bits that are wrong, seen frontally.
@@ -37,7 +38,7 @@ struct CameraParameters {
 
   Eigen::Isometry3d body_T_camera = looking_ahead({0.0, 0.0, 0.0});
 
-  /// A camera at `position_m` in the body's frame that looks along its x axis.
+  /// Pose of a camera at `position_m` in the body's frame that looks along its x axis.
   static Eigen::Isometry3d looking_ahead(const Eigen::Vector3d& position_m);
   /// Pixel of a point in `camera`, which must be in front of it.
   Eigen::Vector2d project(const Eigen::Vector3d& camera_point_m) const;
@@ -48,11 +49,11 @@ struct CameraParameters {
   /// Whether a point in `camera` is in the frustum: within the left image, between near and far.
   bool sees(const Eigen::Vector3d& camera_point_m) const;
 };
-/// The camera that suits a scene: on the roof of the car with a far limit of 25 m in a forest.
+/// Suitable camera for a scene: in a forest on the roof of the car with a far limit of 25 m.
 CameraParameters camera_for(SceneKind kind);
 
-/// What the detector gives. The last two fields are truth: `thing` is what a segmentation camera
-/// would show at the pixel, `point` is known to nobody.
+/// Output of the detector. The last two fields are truth: a segmentation camera would give `thing`;
+/// no sensor gives `point`.
 struct Keypoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double disparity_px = 0.0;
@@ -61,30 +62,31 @@ struct Keypoint {
   PointId point = kNoPoint;
 };
 
-/// How it stands with a point that is in the frustum.
+/// Visibility of a point in the frustum.
 enum class Sight : std::uint8_t {
-  kVisible,      ///< Is where it was, unobstructed.
-  kHidden,       ///< Is there, obstructed in the unchanged scene, too.
-  kNewlyHidden,  ///< Is there, unobstructed in the unchanged scene, obstructed now.
-  kGone,         ///< Is no longer there.
-  kNew,          ///< Was not there in the unchanged scene; visible.
+  kVisible,      ///< At its place, unobstructed.
+  kHidden,       ///< At its place, obstructed in the unchanged scene, too.
+  kNewlyHidden,  ///< At its place, unobstructed in the unchanged scene, obstructed now.
+  kGone,         ///< No longer there.
+  kNew,          ///< Not in the unchanged scene; visible.
 };
 
 /// "visible", "hidden", "newly_hidden", "gone", "new".
 std::string_view to_string(Sight sight);
-/// The sight of this name; none for another.
+/// The sight with this name; none for another.
 std::optional<Sight> sight_of_name(std::string_view name);
 
-/// Truth of one point for one frame. A point that was moved may be there twice: kGone where it was
-/// and kNew where it is.
+/// Truth of one point for one frame. A moved point may be listed twice: kGone at the old place and
+/// kNew at the present one.
 struct ExpectedPoint {
   PointId point = kNoPoint;
   Sight sight = Sight::kVisible;
   bool was_visible = false;         ///< In the unchanged scene, from the same pose.
-  bool is_detected = false;         ///< Gave a keypoint of this frame.
-  ThingId occluder = kGroundThing;  ///< What is in front, where it is hidden.
-  float range_m = 0.0F;             ///< From the camera to where the point is, or was.
-  float measured_m = 0.0F;  ///< Range of the first surface on the line of sight; 0: none in reach.
+  bool is_detected = false;         ///< It gave a keypoint of this frame.
+  ThingId occluder = kGroundThing;  ///< The object in front, if it is hidden.
+  float range_m = 0.0F;             ///< From the camera to the point's place, or its former one.
+  float measured_m =
+      0.0F;  ///< Range of the first surface on the line of sight; 0: none within range.
 };
 
 /// One frame.
@@ -93,11 +95,11 @@ struct CameraFrame {
   std::uint64_t number = 0;
   Eigen::Isometry3d world_T_camera = Eigen::Isometry3d::Identity();  ///< True.
   std::vector<Keypoint> keypoints;
-  /// Points of the unchanged scene in frustum and not too oblique, then new ones that are visible.
+  /// Points of the unchanged scene in the frustum and not too oblique, then new visible ones.
   std::vector<ExpectedPoint> expected;
 };
 
-/// A scene with what the camera needs of it; the built world and its points.
+/// A scene prepared for the camera, with the built world and its points.
 struct Stage {
   Scene scene;
   BuiltScene built;
@@ -110,8 +112,8 @@ struct Stage {
         points(surface_points(scene, built, textures)) {}
 };
 
-/// Looks into a copy of a scene and compares with the unchanged one. Frame k depends on nothing
-/// that was asked before. One camera per thread.
+/// Views a copy of a scene and compares it with the unchanged one. Frame k does not depend on
+/// earlier calls. One camera per thread.
 class KeypointCamera {
  public:
   /// Both stages must outlive the camera; they may be the same one.
@@ -121,7 +123,7 @@ class KeypointCamera {
   /// The frame `number` from this pose of the body. Cost: two rays for each point in the frustum.
   CameraFrame frame(const Eigen::Isometry3d& world_T_body, std::uint64_t number,
                     model::Utime utime);
-  /// As given to the constructor.
+  /// The parameters of the constructor.
   const CameraParameters& parameters() const { return parameters_; }
 
  private:
@@ -139,7 +141,7 @@ class KeypointCamera {
   RayCaster caster_before_;
   RayCaster caster_;
   std::unordered_map<PointId, std::size_t> now_;  ///< Index in copy_.points.
-  std::vector<std::size_t> new_points_;  ///< Indices in copy_.points: not there, or elsewhere.
+  std::vector<std::size_t> new_points_;  ///< Indices in copy_.points: new, or at another place.
 };
 
 }  // namespace understory::sim::changes

@@ -13,7 +13,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kTrunkExtentHeight = 6.0;  ///< Of the part that counts as taken [m].
+constexpr double kTrunkExtentHeight = 6.0;  ///< Of the occupied part [m].
 
 Eigen::Vector2d heading_vector(double rad) { return {std::cos(rad), std::sin(rad)}; }
 
@@ -73,7 +73,7 @@ Thing bush(const Scene& scene, const Eigen::Vector2d& at_m) {
                         box_on(at_m, ground_at(scene, at_m), {1.6, 1.6, 1.2}, 0.0));
 }
 
-/// A place beside the path, `aside_m` from it, and the path's heading there.
+/// A position beside the path, `aside_m` from it, and the path's heading there.
 struct Roadside {
   Eigen::Vector2d at_m;
   double heading_rad;
@@ -81,7 +81,7 @@ struct Roadside {
 Roadside beside(std::span<const Eigen::Vector3d> path_m, double aside_m, std::mt19937_64& random) {
   std::uniform_int_distribution<std::size_t> draw(1, std::max<std::size_t>(1, path_m.size() - 1));
   std::size_t i = draw(random);
-  // A body that hovers has no heading there.
+  // While hovering the path has no heading.
   while (i > 1 && (path_m[i] - path_m[i - 1]).head<2>().norm() < 1e-4) --i;
   const Eigen::Vector2d step = (path_m[i] - path_m[i - 1]).head<2>();
   const double heading = std::atan2(step.y(), step.x());
@@ -180,7 +180,7 @@ bool are_close(const Box& a, const Box& b, double gap_m) {
   const double rise = std::abs(a.centre_m.z() - b.centre_m.z());
   if (rise >= a.half_size_m.z() + b.half_size_m.z()) return false;
 
-  // Two convex shapes are apart if they are so along a normal of one of their sides.
+  // Two convex shapes are disjoint if they are so along a normal of one of their sides.
   const Eigen::Vector2d between = (b.centre_m - a.centre_m).head<2>();
   for (const double heading : {a.heading_rad, b.heading_rad}) {
     const Eigen::Vector2d ahead = heading_vector(heading);

@@ -17,7 +17,7 @@ using std::numbers::pi;
 
 constexpr std::uint64_t kSurfacePurpose = 0x9017;
 constexpr std::uint64_t kTexturePurpose = 0x7e47;
-constexpr double kGroundGap = 0.02;  ///< A lower side nearer to the ground has no points [m].
+constexpr double kGroundGap = 0.02;  ///< Lower sides closer to the ground have no points [m].
 
 /// Draws points on one thing.
 class PointSampler {
@@ -25,7 +25,7 @@ class PointSampler {
   PointSampler(const Scene& scene, const BuiltScene& built, const TextureParameters& textures)
       : scene_(scene), built_(built), textures_(textures) {}
 
-  /// `first_object`: where the thing's shapes begin in the world.
+  /// `first_object`: index of the thing's first shape in the world.
   void sample(const Thing& thing, ObjectId first_object, std::vector<SurfacePoint>& points) {
     thing_ = &thing;
     object_ = first_object;
@@ -36,7 +36,7 @@ class PointSampler {
   }
 
   void operator()(const Tree& /*tree*/) {
-    // The trunk is the first shape that plant_tree() adds.
+    // The trunk is the first shape added by plant_tree().
     const Stem* trunk = built_.world->stem(object_);
     if (trunk == nullptr) return;
     const double root_m = 0.5;  // of a trunk, below the ground

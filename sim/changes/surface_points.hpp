@@ -1,4 +1,4 @@
-// Points on the surfaces of things that a detector of keypoints would find again.
+// Points on the surfaces of things that a keypoint detector would detect repeatedly.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,16 +10,16 @@
 
 namespace understory::sim::changes {
 
-/// Id of a point: the id of its thing and a number on it. It goes where the thing goes.
+/// Id of a point: the id of its thing and a number on it. It moves with the thing.
 using PointId = std::uint64_t;
 /// No point: a false keypoint.
 inline constexpr PointId kNoPoint = 0;
-/// Bits of an id that count on the thing; the thing's id is above them.
+/// Bits of the number on the thing; the thing's id is above them.
 inline constexpr int kPointBits = 20;
 /// The thing of a point.
 constexpr ThingId thing_of(PointId point) { return static_cast<ThingId>(point >> kPointBits); }
 
-/// A binary descriptor of 256 bits, as BRIEF and ORB give.
+/// A binary descriptor of 256 bits, as in BRIEF and ORB.
 using Descriptor = std::array<std::uint64_t, 4>;
 /// Number of bits in which two descriptors differ.
 int hamming_distance(const Descriptor& a, const Descriptor& b);
@@ -32,15 +32,15 @@ struct SurfacePoint {
   Descriptor descriptor{};                               ///< Without noise.
 };
 
-/// How many points there are, and how alike they look.
+/// Density of points, and their similarity.
 struct TextureParameters {
   double structure_per_m2 = 4.0;  ///< On walls and ceilings.
   double thing_per_m2 = 20.0;     ///< On furniture and equipment.
   double paint_per_m2 = 4.0;      ///< On cars, lorries and carts.
   double trunk_per_m2 = 15.0;     ///< On trunks, up to `trunk_height_m`.
   double trunk_height_m = 3.5;    ///< Above the ground.
-  double repeated_share = 0.2;    ///< Of the points look like others: labels, screws, bark.
-  int repeated_textures = 64;     ///< Different ones of those in a scene.
+  double repeated_share = 0.2;    ///< Of the points with a repeated texture: labels, screws, bark.
+  int repeated_textures = 64;     ///< Number of different repeated textures in a scene.
 };
 
 /// All points of the scene, in order of id. A thing has the same points in every copy. None on the

@@ -8,15 +8,15 @@
 
 namespace understory::sim::changes {
 
-/// Walks a table row by row. Whatever is wrong throws io::DataError with file, line and column.
+/// Reads a table row by row. Any error throws io::DataError with file, line and column.
 class TableReader {
  public:
-  /// `heading` is what the first line must be. The text must outlive the reader.
+  /// `heading`: required first line. The text must outlive the reader.
   TableReader(std::string_view text, std::string source, std::string_view heading);
 
   /// Goes to the next row; false at the end.
   bool next();
-  /// Cells of the present row, by number of the column.
+  /// Cells of the present row, by column number.
   std::string_view text(std::size_t column) const;
   double number(std::size_t column) const;                                ///< Finite.
   std::uint64_t count(std::size_t column) const;                          ///< Not negative.
@@ -24,7 +24,7 @@ class TableReader {
   std::uint64_t hexadecimal(std::size_t column, std::size_t word) const;  ///< 16 digits of a cell.
   /// Refuses the present row.
   [[noreturn]] void refuse(const std::string& why) const;
-  /// Refuses a cell of it.
+  /// Refuses a cell of the present row.
   [[noreturn]] void refuse_cell(std::size_t column, std::string_view wanted) const;
 
  private:
