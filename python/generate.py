@@ -1,7 +1,7 @@
 """Makes the package's types: generate.py LCM_GEN FOLDER TYPE.lcm ...
 
-lcm-gen gives arrays of bytes the text "" to begin with, which its own encoder refuses: a message
-with such a field that was left empty could not be sent. They become b"".
+lcm-gen initialises arrays of bytes with the text "", which its own encoder refuses: a message with
+an empty field of this kind could not be sent. They become b"".
 """
 
 import pathlib
@@ -11,7 +11,7 @@ import sys
 
 
 def mended(code):
-    """The code of a type with empty bytes where it had empty text."""
+    """The code of a type with empty bytes instead of empty text."""
     for name in set(re.findall(r"bytearray\(self\.(\w+)\[", code)):
         code = re.sub(rf'(self\.{name} = )""', r'\1b""', code)
     return code

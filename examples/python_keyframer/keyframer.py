@@ -1,5 +1,5 @@
-"""A keyframer in Python: each scan with enough landmarks becomes a keyframe. Starts instead of
-understory-keyframer; the channels are the only contract. Keyframes of one scan need
+"""A keyframer in Python: each scan with enough landmarks becomes a keyframe. Run it instead of
+understory-keyframer; the channels are the only interface. Keyframes of one scan need
 `min_observations = 1` in [smoothing] of geoslam_mapper.toml.
 
     understory launch --only NAME ...    (all processes but keyframer)
@@ -20,7 +20,7 @@ def keyframe_of(scan, number):
     keyframe = types.keyframe2_t()
     keyframe.utime, keyframe.seq = scan.utime, number
     keyframe.max_range_m, keyframe.bearing_rad, keyframe.width_rad = scan.max_range_m, scan.bearing_rad, scan.width_rad
-    # The only member is the base, and the landmarks' frame is the vehicle's: exact but for a millimetre.
+    # The only member is the base, and the landmarks' frame is the vehicle's: exact, except for a millimetre.
     base = types.keyframe_member_t()
     base.utime, base.seq = scan.utime, scan.seq
     base.covariance = [[1e-6 if row == column else 0.0 for column in range(3)] for row in range(3)]

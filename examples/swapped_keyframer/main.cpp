@@ -1,5 +1,5 @@
-// A keyframer of one's own: each scan with enough landmarks becomes a keyframe. Starts instead of
-// understory-keyframer; the channels are the only contract.
+// A user's own keyframer: each scan with enough landmarks becomes a keyframe. Run it instead of
+// understory-keyframer; the channels are the only interface.
 #include <memory>
 
 #include "common/bus/service.hpp"
@@ -15,7 +15,7 @@ model::Keyframe keyframe_of(const model::LandmarkScan& scan, std::uint64_t seque
   keyframe.sequence = sequence;
   keyframe.field_of_view = scan.field_of_view;
   // The only member is the base, and the landmarks' frame is the vehicle's: the pose of the base in
-  // it is exact, but for a millimetre, so that no covariance is singular.
+  // it is exact, with a sigma of 1 mm so that no covariance is singular.
   model::KeyframeMember base;
   base.utime = scan.utime;
   base.sequence = scan.sequence;

@@ -24,17 +24,17 @@ _MAGIC_SHORT = 0x4C433032
 _MAGIC_FRAGMENT = 0x4C433033
 _DATAGRAM_BYTES = 1400
 _MOST_MESSAGE_BYTES = 1 << 28
-_MOST_OPEN = 64  # messages of which fragments are missing
+_MOST_OPEN = 64  # messages with missing fragments
 _BUFFER_BYTES = 4 << 20
 
 
 def is_bulk(channel):
-    """Whether a channel travels in the second group (sweeps)."""
+    """Whether a channel uses the second multicast group (sweeps)."""
     return channel.startswith(("RAW_SWEEP", "LIDAR_SWEEP"))
 
 
 def _groups(url):
-    """(address, port) of the group and of that for sweeps, and the TTL."""
+    """(address, port) of the first group and of the group for sweeps, and the TTL."""
     parts = urlparse(url)
     if parts.scheme != "udpm" or not parts.hostname or not parts.port:
         raise ValueError(f"{url}: not of the form udpm://ADDRESS:PORT?ttl=N")
@@ -52,13 +52,13 @@ def _groups(url):
 
 
 class _Fragments:
-    """Messages that are put together again."""
+    """Reassembly of messages from fragments."""
 
     def __init__(self):
         self._open = {}
 
     def add(self, sender, datagram):
-        """(channel, data) where this datagram completes one, else None."""
+        """(channel, data) if this datagram completes a message, else None."""
         _, sequence, size, offset, number, count = _FRAGMENT.unpack_from(datagram)
         if size > _MOST_MESSAGE_BYTES or number >= count:
             return None
@@ -87,7 +87,7 @@ class _Fragments:
 class Bus:
     """Both groups of the bus. `damaged` counts messages of a known type that could not be decoded.
 
-    Raises ValueError for a URL of another form, OSError where the group cannot be joined.
+    Raises ValueError for a URL of another form, OSError if the group cannot be joined.
     """
 
     def __init__(self, url=DEFAULT_URL):
@@ -110,7 +110,7 @@ class Bus:
                 self._receivers[group] = self._join(group)
 
     def _needed_groups(self, channels):
-        """A plain name needs one group alone; sweeps are most of all bytes."""
+        """A plain name needs only one group; sweeps are most of all bytes."""
         if re.fullmatch(r"\w+", channels):
             return [self._bulk if is_bulk(channels) else self._group]
         return [self._group, self._bulk]
@@ -127,7 +127,7 @@ class Bus:
         return receiver
 
     def publish(self, channel, message):
-        """Sends a message of a type of understory, or bytes."""
+        """Sends a message of understory's types, or bytes."""
         data = message if isinstance(message, (bytes, bytearray)) else message.encode()
         name = channel.encode() + b"\0"
         group = self._bulk if is_bulk(channel) else self._group
@@ -148,7 +148,7 @@ class Bus:
             self._sender.sendto(header + (name if number == 0 else b"") + data[start:end], group)
 
     def handle(self, timeout_s=1.0):
-        """Waits for one datagram and hands out what it completes. False where none came in time."""
+        """Waits for one datagram and passes a completed message to its handlers. False if none arrived in time."""
         ready, _, _ = select.select(list(self._receivers.values()), [], [], timeout_s)
         if not ready:
             return False
@@ -183,7 +183,7 @@ class Bus:
             handler(channel, data if message is None else message)
 
     def run(self, for_s=None):
-        """Hands out messages until `for_s` seconds have passed; for ever where it is None."""
+        """Passes messages to their handlers for `for_s` seconds; forever if it is None."""
         end = None if for_s is None else time.monotonic() + for_s
         while end is None or time.monotonic() < end:
             self.handle(0.1 if end is None else max(0.0, min(0.1, end - time.monotonic())))

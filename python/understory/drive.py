@@ -1,4 +1,4 @@
-"""What a log of a drive has, as numpy arrays: poses, truth, the map, health.
+"""The results in a log of a drive as numpy arrays: poses, truth, the map, health.
 
     drive = Drive("run.lcm")
     poses = drive.poses()            # a structured array
@@ -47,7 +47,7 @@ def _pose(pose):
 class Drive:
     """The results in a log, read once. Times are seconds since 1970 of the measurement.
 
-    Raises log.LogError for a file that is no log, ValueError for a damaged message of a channel that is read.
+    Raises log.LogError for a file that is no log, ValueError for a damaged message of a used channel.
     """
 
     _CHANNELS = ["SLAM_POSE", "EKF_POSE", "GROUND_TRUTH", "MAP", "HEALTH"]
@@ -68,7 +68,7 @@ class Drive:
 
     def poses(self):
         """SLAM_POSE: map_T_vehicle with covariance (right perturbation: x, y [m], theta [rad]),
-        status (see STATUS) and map_id. Those whose status says that they have no pose are left out."""
+        status (see STATUS) and map_id. Messages without a pose by their status are left out."""
         rows = [
             (m.utime * 1e-6, *_compound(m.map_T_submap, m.submap_T_vehicle), m.covariance, m.status, m.map_id)
             for m in self._messages["SLAM_POSE"]
@@ -119,7 +119,7 @@ class Drive:
         return np.array(rows, dtype=[*_POSE, *_COVARIANCE, ("keyframe_seq", int)])
 
     def health_messages(self):
-        """HEALTH as it came: messages with all reasons and channels."""
+        """HEALTH messages, unchanged, with all reasons and channels."""
         return list(self._messages["HEALTH"])
 
     def health(self):
@@ -156,11 +156,11 @@ def _rotation(theta):
 
 
 def errors_m(poses, truth, hold_first=False):
-    """Distance of each pose to the truth at its time [m]; NaN outside of the truth's time.
+    """Distance of each pose to the truth at its time [m]; NaN outside the truth's time.
 
-    The frame of the map is tied to the truth's by the one rigid motion that fits all poses best
-    (Umeyama 1991 without scale: the ATE is the RMS of this), or by the first pose alone: what a pose
-    states of itself counts from there.
+    The frame of the map is aligned with the truth's by the rigid motion that fits all poses best
+    (Umeyama 1991 without scale: the ATE is the RMS of the result), or by the first pose alone: the
+    stated covariances are relative to it.
     """
     if len(truth) == 0:
         return np.full(len(poses), np.nan)

@@ -20,7 +20,7 @@ _SEARCH_BYTES = 1 << 20
 
 
 class LogError(ValueError):
-    """A log that cannot be read; the text names file and place."""
+    """A log that cannot be read; the text has the file and the position."""
 
 
 class Event(NamedTuple):
@@ -33,17 +33,16 @@ class Event(NamedTuple):
 
     @property
     def message(self):
-        """The decoded message; None where it is of no type of understory. Raises ValueError where
-        it is damaged."""
+        """The decoded message; None if it has none of understory's types. Raises ValueError if it is
+        damaged."""
         return messages.decode(self.data)
 
 
 class Log:
     """An LCM log, read from the start each time it is iterated over.
 
-    `channels`: names or regular expressions that match a whole name; None = all. What is damaged in
-    the middle is passed over; `damaged_bytes` says how much, and an event that was cut off at the
-    end counts as well. Raises LogError for a file that cannot be opened or is no LCM log. Memory: one event.
+    `channels`: names or regular expressions that match a whole name; None = all. Damaged parts are
+    skipped; `damaged_bytes` is their size, including an event truncated at the end of the file. Raises LogError for a file that cannot be opened or is no LCM log. Memory: one event.
     """
 
     def __init__(self, path, channels=None):
@@ -88,7 +87,7 @@ class Log:
 
     @staticmethod
     def _next(file):
-        """The event at this place; None where there is none."""
+        """The event at this position; None if there is none."""
         header = file.read(_HEADER.size)
         if len(header) < _HEADER.size:
             return None
@@ -104,7 +103,7 @@ class Log:
 
     @staticmethod
     def _find_sync(file, start) -> Optional[int]:
-        """Where the next sync word stands at or after `start`."""
+        """Position of the next sync word at or after `start`."""
         file.seek(start)
         kept = b""
         while True:
@@ -138,7 +137,7 @@ class LogWriter:
         self._file.close()
 
     def write(self, utime, channel, message):
-        """One event. `message`: of a type of understory, or bytes."""
+        """Writes one event. `message`: of one of understory's types, or bytes."""
         data = message if isinstance(message, (bytes, bytearray)) else message.encode()
         name = channel.encode()
         self._file.write(_HEADER.pack(_SYNC, self._number, utime, len(name), len(data)) + name + data)

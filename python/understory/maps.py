@@ -17,7 +17,7 @@ _POINT = struct.Struct("<2sBBiBIdd")
 
 
 class MapError(ValueError):
-    """A map file that cannot be read; the text names the file."""
+    """A map file that cannot be read; the text has the file's name."""
 
 
 def _rows(path, query, values=()):
@@ -41,8 +41,8 @@ def map_ids(path):
 
 def landmarks(path, map_id=None):
     """Landmarks of one map, or of all: position in the frame of the file [m], covariance [m^2],
-    diameter [m] (NaN: unknown), kind, times_seen, existence (probability; NaN: unknown). What lies
-    in a submap's own frame is placed by the file already."""
+    diameter [m] (NaN: unknown), kind, times_seen, existence (probability; NaN: unknown). The file
+    has landmarks of submaps already converted to this frame."""
     where = "" if map_id is None else " WHERE map_id = ?"
     rows = _rows(
         path,

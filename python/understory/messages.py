@@ -1,6 +1,6 @@
-"""Messages by the types of understory: which class reads some bytes.
+"""Decoding of messages of understory's types: selects the class for some bytes.
 
-The types themselves come from lcm-gen and stand in this package: `understory.slam_pose2_t` and so on.
+The types themselves are made by lcm-gen and are in this package: `understory.slam_pose2_t` and so on.
 """
 
 import understory
@@ -21,12 +21,12 @@ _BY_FINGERPRINT = _types()
 
 
 def decode(data):
-    """The message in these bytes, by the fingerprint at their start; None where no type of understory
-    has it. Raises ValueError where the type is known and the bytes are damaged."""
+    """The message in these bytes, by the fingerprint at their start; None if no type of understory has
+    it. Raises ValueError if the type is known and the bytes are damaged."""
     message_type = _BY_FINGERPRINT.get(bytes(data[:_FINGERPRINT_BYTES]))
     if message_type is None:
         return None
     try:
         return message_type.decode(bytes(data))
-    except Exception as error:  # lcm-gen's decoders raise whatever struct and UTF-8 do
+    except Exception as error:  # lcm-gen's decoders raise all errors of struct and UTF-8
         raise ValueError(f"damaged {message_type.__name__}: {error}") from error

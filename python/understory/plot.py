@@ -28,7 +28,7 @@ def draw_map(axes, drive):
 
 
 def draw_errors(axes, drive):
-    """What each pose states of itself, and its error where the truth is known."""
+    """The stated standard deviation of each pose, and its error if the truth is known."""
     poses, truth = drive.poses(), drive.truth()
     t_s = poses["t_s"] - poses["t_s"][0]
     sigma_m = np.sqrt(np.trace(poses["covariance"][:, :2, :2], axis1=1, axis2=2))
@@ -41,7 +41,7 @@ def draw_errors(axes, drive):
 
 
 def draw(log_file, picture):
-    """Draws the drive of a log into a picture. Raises ValueError where the log has no SLAM_POSE."""
+    """Draws the drive of a log into a picture. Raises ValueError if the log has no SLAM_POSE."""
     drive = Drive(log_file)
     if len(drive.poses()) == 0:
         raise ValueError(f"{log_file}: no SLAM_POSE in it (run understory replay first)")

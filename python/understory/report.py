@@ -34,7 +34,7 @@ img { max-width: 100% } h1 { font-size: 1.5em } h2 { font-size: 1.15em; margin-t
 
 
 def _picture(draw, size):
-    """A figure as an <img> that holds its own bytes."""
+    """A figure as an <img> with embedded data."""
     figure, axes = plt.subplots(figsize=size, layout="constrained")
     draw(axes)
     buffer = io.BytesIO()
@@ -44,7 +44,7 @@ def _picture(draw, size):
 
 
 def _table(heading, rows):
-    """Cells are escaped; numbers stand to the right."""
+    """Cells are escaped; numbers are right-aligned."""
     lines = ["<table><tr>" + "".join(f"<th>{html.escape(one)}</th>" for one in heading) + "</tr>"]
     for row in rows:
         cells = (
@@ -91,7 +91,7 @@ def _draw_health(health):
             said = health[health["process"] == process]
             ends_s = np.append(said["t_s"][1:], said["t_s"][-1] + 1.0)
             for one, end_s in zip(said, ends_s):
-                # A process that says nothing for 3 s is not known to be anything.
+                # The state of a process without HEALTH for 3 s is unknown.
                 width_s = min(end_s - one["t_s"], 3.0)
                 axes.barh(row, width_s, left=one["t_s"] - start_s, color=_COLOUR[HEALTH_STATE[one["state"]]], height=0.7)
         axes.set_yticks(range(len(processes)), processes)
@@ -102,7 +102,7 @@ def _draw_health(health):
 
 
 def _health_rows(drive):
-    """When a process's state or reason changed, and to what."""
+    """Changes of a process's state or reason, with their times."""
     last, rows = {}, []
     start_s = None
     for message in drive.health_messages():
@@ -155,7 +155,7 @@ def _channels(path):
 
 
 def report(log_file):
-    """The report as HTML. Raises ValueError where the log has no SLAM_POSE or cannot be read."""
+    """The report as HTML. Raises ValueError if the log has no SLAM_POSE or cannot be read."""
     drive = Drive(log_file)
     if len(drive.poses()) == 0:
         raise ValueError(f"{log_file}: no SLAM_POSE in it (run understory replay first)")
