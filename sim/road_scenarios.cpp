@@ -88,7 +88,7 @@ Points shortened(const Points& points, double length_m) {
 }  // namespace
 
 Scenario urban_scenario(int laps, std::uint64_t seed, double overlap_m) {
-  // 2 * (215 + 140) m less what the rounded corners cut off, which is about 10 m.
+  // 2 * (215 + 140) m minus the loss at the rounded corners, about 10 m.
   const Points corners{{0, 0}, {110, 0}, {110, 140}, {-105, 140}, {-105, 0}};
   Points points;
   for (int lap = 0; lap <= laps; ++lap) {

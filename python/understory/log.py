@@ -42,7 +42,8 @@ class Log:
     """An LCM log, read from the start each time it is iterated over.
 
     `channels`: names or regular expressions that match a whole name; None = all. Damaged parts are
-    skipped; `damaged_bytes` is their size, including an event truncated at the end of the file. Raises LogError for a file that cannot be opened or is no LCM log. Memory: one event.
+    skipped; `damaged_bytes` is their size, including an event truncated at the end of the file.
+    Raises LogError for a file that cannot be opened or is no LCM log. Memory: one event.
     """
 
     def __init__(self, path, channels=None):

@@ -21,7 +21,7 @@ struct AssociatorParameters {
   int min_matched = 3;             ///< Least number of matches in a scan that fits.
   int max_misfits = 2;             ///< Successive scans without a fit before all tracks begin anew.
   int confirm_matches = 4;         ///< [k] Matches that make a track consistent ...
-  int confirm_window = 6;          ///< [n] ... within so many scans.
+  int confirm_window = 6;          ///< [n] ... within this number of scans.
   int max_missed = 20;             ///< Successive scans without a match before a track ends.
   double keep_range_factor = 1.2;  ///< Tracks end beyond this multiple of the range.
   /// A match is published if it is more likely than any other pairing by this factor.

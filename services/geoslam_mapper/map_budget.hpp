@@ -14,7 +14,7 @@ class MapBudget {
   /// `share` of all bytes, 0 (nothing is earned) to below 1.
   explicit MapBudget(double share = 0.1) : earned_per_byte_(share / (1.0 - share)) {}
 
-  /// Adds bytes that were sent on other channels.
+  /// Whether a MAP of this size stays within the share.
   void earn(std::size_t bytes) { credit_bytes_ += earned_per_byte_ * static_cast<double>(bytes); }
   /// Whether a MAP of so many bytes stays within the share.
   bool affords(std::size_t bytes) const { return static_cast<double>(bytes) <= credit_bytes_; }

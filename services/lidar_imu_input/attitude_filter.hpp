@@ -96,8 +96,9 @@ class AttitudeFilter {
   void mark_level();
   /// Present estimate of the level at the last add_standstill().
   const RestTilt& rest() const { return rest_; }
-  /// Covariance of that error minus the present error, both about the axes of that time [rad^2].
-  /// Zero at the standstill: the unobservable part displaces earlier and present landmarks alike.
+  /// Covariance of that error minus the present error, by the present estimates of both, about the
+  /// axes of that time [rad^2]. Zero at the standstill: the unobservable part displaces earlier and
+  /// present landmarks alike.
   Eigen::Matrix2d tilt_change_covariance() const;
   /// Rotation of the level's heading by corrections of roll and pitch since the last mark [rad]:
   /// nonzero on a slope. Levelled data rotate by the same angle.

@@ -122,7 +122,8 @@ void add_scan(const Scene& scene, const FrameRequest& request, nlohmann::ordered
   writer.add("detection_kind", std::span<const std::uint8_t>(kinds));
 }
 
-/// Slot of an expected landmark; none if the landmark is out of use and not expected.
+/// Slot of an expected landmark at the page; none if it is out of use, since it is not expected
+/// then.
 std::optional<Slot> slot_in_use(const LandmarkTable& table, model::LandmarkId id) {
   const auto slot = table.slot_of(id);
   if (slot && (table.slots()[*slot].flags & SceneLandmark::kOutOfUse) != 0) return std::nullopt;

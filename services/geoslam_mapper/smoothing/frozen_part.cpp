@@ -143,8 +143,8 @@ std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
     add_outer(one->nodes, bundles, part);
   }
 
-  // The origin of the map, node 0, last: from there all other nodes are equally far away, and their
-  // measurements of each other are lost in rounding.
+  // The origin of the map, node 0, last: in its frame the other nodes are one distant cluster, and
+  // measurements within the cluster are lost in rounding.
   std::vector<FrozenPart> result;
   for (auto& [root, part] : parts) {
     std::ranges::sort(part.outer, std::greater{});

@@ -42,7 +42,7 @@ class PoseGraph {
 
   /// Saves the state.
   void checkpoint();
-  /// Restores exactly the state of the last checkpoint(). Costs what changed.
+  /// Restores exactly the state of the last checkpoint(). Cost: the changes.
   void rollback();
 
   /// Adds a node at an initial guess of its pose. A fixed node is held there, to a micrometre: it

@@ -49,8 +49,8 @@ class CalibrationWatch {
   CalibrationError lately() const { return seconds_.error(); }
 
   /// Whether the last step differs by far more than both covariances allow, or no motion fits it,
-  /// or the clock jumped within the last ten seconds: a jump of the landmarks' frame or its clock,
-  /// or slipping wheels.
+  /// or the clock appears to have jumped within the last ten seconds: a jump of the landmarks'
+  /// frame or its clock, or slipping wheels.
   bool contradicts() const { return contradicts_ || has_jumped_; }
 
   /// Members of a saved state; see common/state.

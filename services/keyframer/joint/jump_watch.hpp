@@ -57,7 +57,7 @@ class JumpWatch {
 
   std::array<Left, kScans> motions_{};  ///< Ring buffer.
   std::size_t count_ = 0;               ///< Motions since the start of the mean.
-  double scatter_ = 1.0;                ///< Mean square of late_sigmas().
+  double scatter_ = 1.0;                ///< Mean square of the jump in stated sigmas.
   double late_sigmas_ = 0.0;
 };
 
