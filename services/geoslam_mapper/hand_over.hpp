@@ -64,7 +64,7 @@ class CorrectionWatch {
   /// Whether the poses are to be compared now.
   bool is_due(model::Utime now) const;
   /// The message, if a pose is new or has moved since the last message; `is_last`: by any distance,
-  /// else by at least 0.05 m.
+  /// else by more than 0.05 m.
   std::optional<model::MapCorrection> next(model::Utime now, std::uint32_t map_id,
                                            std::vector<model::SubmapPose> poses, bool is_last);
 
