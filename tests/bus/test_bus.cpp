@@ -5,14 +5,15 @@
 #include <memory>
 
 #include "common/bus/bulk_group.hpp"
-#include "common/bus/faulty_bus.hpp"
-#include "common/bus/late_bus.hpp"
 #include "common/bus/live_bus.hpp"
 #include "common/bus/memory_bus.hpp"
+#include "tests/bus/faulty_bus.hpp"
+#include "tests/bus/late_bus.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
 using namespace understory::bus;
+using namespace understory::test;
 
 namespace {
 

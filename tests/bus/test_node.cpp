@@ -1,8 +1,8 @@
 // From bytes to a stage and back, with faults.
 #include <limits>
 
-#include "common/bus/faulty_bus.hpp"
 #include "common/bus/memory_bus.hpp"
+#include "tests/bus/faulty_bus.hpp"
 #include "tests/bus/toy_service.hpp"
 #include "tests/catch.hpp"
 

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "common/bus/config_file.hpp"
-#include "common/bus/faulty_bus.hpp"
-#include "common/bus/late_bus.hpp"
 #include "common/bus/launch_config.hpp"
 #include "eval/harness/chain_drive.hpp"
 #include "sim/scenarios.hpp"
+#include "tests/bus/faulty_bus.hpp"
+#include "tests/bus/late_bus.hpp"
 
 namespace understory::test {
 
@@ -64,7 +64,7 @@ inline std::vector<TapeEntry> record(const ShortDrive& short_drive,
 
 /// What is wrong all the time with the bus of a LateChain, and its computer.
 struct Surroundings {
-  bus::FaultPlan faults = {};  ///< Of every process, and of the sensors.
+  test::FaultPlan faults = {};  ///< Of every process, and of the sensors.
   std::uint64_t seed = 1;
   bus::Clock clock = bus::no_clock();
 };
@@ -81,9 +81,9 @@ class LateChain {
     for (const bus::Service& service : eval::harness::services_of(config)) {
       const std::filesystem::path file = bus::config_file_in(config, service.name);
       Hosted& hosted = hosted_[service.name];
-      hosted.faulty = std::make_unique<bus::FaultyBus>(bus_, surroundings.faults,
-                                                       surroundings.seed + hosted_.size());
-      hosted.bus = std::make_unique<bus::LateBus>(*hosted.faulty);
+      hosted.faulty = std::make_unique<test::FaultyBus>(bus_, surroundings.faults,
+                                                        surroundings.seed + hosted_.size());
+      hosted.bus = std::make_unique<test::LateBus>(*hosted.faulty);
       hosted.service = std::make_unique<bus::HostedService>(
           service, *hosted.bus, surroundings.clock, file.empty() ? "" : bus::read_config_file(file),
           file.string());
@@ -98,9 +98,9 @@ class LateChain {
     bus_.drain();
   }
   /// The sensors' side of the bus.
-  bus::LateBus& sensors() { return sensors_; }
+  test::LateBus& sensors() { return sensors_; }
   /// A service's side of the bus. Throws std::out_of_range for an unknown name.
-  bus::LateBus& bus_of(const std::string& service) { return *hosted_.at(service).bus; }
+  test::LateBus& bus_of(const std::string& service) { return *hosted_.at(service).bus; }
   /// What was late comes, and all that follows from it.
   void go_on() {
     sensors_.go_on();
@@ -130,8 +130,8 @@ class LateChain {
 
  private:
   struct Hosted {
-    std::unique_ptr<bus::FaultyBus> faulty;
-    std::unique_ptr<bus::LateBus> bus;
+    std::unique_ptr<test::FaultyBus> faulty;
+    std::unique_ptr<test::LateBus> bus;
     std::unique_ptr<bus::HostedService> service;
   };
 
@@ -147,8 +147,8 @@ class LateChain {
   }
 
   bus::MemoryBus bus_;
-  bus::FaultyBus faulty_sensors_;
-  bus::LateBus sensors_;
+  test::FaultyBus faulty_sensors_;
+  test::LateBus sensors_;
   std::map<std::string, Hosted> hosted_;
   std::set<std::string, std::less<>> outputs_;
   std::map<std::string, std::vector<std::size_t>> said_;

@@ -1,24 +1,25 @@
-#include "common/bus/late_bus.hpp"
+#include "tests/bus/late_bus.hpp"
 
 #include <utility>
 
-namespace understory::bus {
+namespace understory::test {
 
 std::optional<wire::Refusal> LateBus::publish(std::string_view channel,
                                               std::span<const std::uint8_t> bytes) {
   if (!held_channels_.contains(channel)) return inner_.publish(channel, bytes);
-  if (auto refusal = check_publishable(channel, bytes.size())) return refusal;
+  if (auto refusal = bus::check_publishable(channel, bytes.size())) return refusal;
   waiting_.push_back({std::string(channel), {bytes.begin(), bytes.end()}});
   return std::nullopt;
 }
 
 void LateBus::subscribe(std::string_view channel, std::size_t queue_size, Handler handler) {
   handlers_.push_back(std::move(handler));
-  inner_.subscribe(channel, queue_size, [this, own = &handlers_.back()](const BusMessage& message) {
-    if (!is_stopped_) return (*own)(message);
-    waiting_.push_back(
-        {std::string(message.channel), {message.bytes.begin(), message.bytes.end()}, own});
-  });
+  inner_.subscribe(
+      channel, queue_size, [this, own = &handlers_.back()](const bus::BusMessage& message) {
+        if (!is_stopped_) return (*own)(message);
+        waiting_.push_back(
+            {std::string(message.channel), {message.bytes.begin(), message.bytes.end()}, own});
+      });
 }
 
 void LateBus::go_on() {
@@ -33,4 +34,4 @@ void LateBus::go_on() {
   }
 }
 
-}  // namespace understory::bus
+}  // namespace understory::test

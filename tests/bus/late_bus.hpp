@@ -8,14 +8,14 @@
 
 #include "common/bus/bus.hpp"
 
-namespace understory::bus {
+namespace understory::test {
 
 /// A bus around `inner` for one process: a bridge that holds its messages back, or SIGSTOP. For
 /// tests on a MemoryBus, whose queues must lose nothing.
-class LateBus : public Bus {
+class LateBus : public bus::Bus {
  public:
   /// `inner` must outlive it.
-  explicit LateBus(Bus& inner) : inner_(inner) {}
+  explicit LateBus(bus::Bus& inner) : inner_(inner) {}
 
   /// From now on what is published on this channel waits.
   void hold(std::string channel) { held_channels_.insert(std::move(channel)); }
@@ -38,11 +38,11 @@ class LateBus : public Bus {
     const Handler* handler = nullptr;  ///< Of what is heard; null of what is published.
   };
 
-  Bus& inner_;
+  bus::Bus& inner_;
   std::set<std::string, std::less<>> held_channels_;
   bool is_stopped_ = false;
   std::deque<Handler> handlers_;
   std::vector<Waiting> waiting_;
 };
 
-}  // namespace understory::bus
+}  // namespace understory::test

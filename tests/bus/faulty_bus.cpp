@@ -1,13 +1,13 @@
-#include "common/bus/faulty_bus.hpp"
+#include "tests/bus/faulty_bus.hpp"
 
 #include <algorithm>
 #include <utility>
 
-namespace understory::bus {
+namespace understory::test {
 
 std::optional<wire::Refusal> FaultyBus::publish(std::string_view channel,
                                                 std::span<const std::uint8_t> bytes) {
-  if (auto refusal = check_publishable(channel, bytes.size())) return refusal;
+  if (auto refusal = bus::check_publishable(channel, bytes.size())) return refusal;
   const bool is_target =
       plan_.channels.empty() ||
       std::find(plan_.channels.begin(), plan_.channels.end(), channel) != plan_.channels.end();
@@ -111,4 +111,4 @@ bool FaultyBus::handle_one(int timeout_ms) { return inner_.handle_one(timeout_ms
 
 std::uint64_t FaultyBus::dropped(std::string_view channel) const { return inner_.dropped(channel); }
 
-}  // namespace understory::bus
+}  // namespace understory::test

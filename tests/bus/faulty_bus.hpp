@@ -1,5 +1,5 @@
 // A bus that loses, repeats, holds back, swaps and damages what is published through it: seeded,
-// and every fault counted. For tests, and between two buses.
+// and every fault counted.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 #include "common/bus/bus.hpp"
 
-namespace understory::bus {
+namespace understory::test {
 
 /// Probabilities per message, 0..1; at most one fault befalls a message.
 struct FaultPlan {
@@ -40,10 +40,10 @@ struct FaultCounts {
 };
 
 /// A bus around `inner` that applies a FaultPlan to what is published; what comes in is left alone.
-class FaultyBus : public Bus {
+class FaultyBus : public bus::Bus {
  public:
   /// `inner` must outlive it. The same seed and messages give the same faults.
-  FaultyBus(Bus& inner, FaultPlan plan, std::uint64_t seed)
+  FaultyBus(bus::Bus& inner, FaultPlan plan, std::uint64_t seed)
       : inner_(inner), plan_(std::move(plan)), random_(seed) {}
 
   std::optional<wire::Refusal> publish(std::string_view channel,
@@ -52,8 +52,8 @@ class FaultyBus : public Bus {
   bool handle_one(int timeout_ms) override;
   std::uint64_t dropped(std::string_view channel) const override;
   int file_descriptor() const override { return inner_.file_descriptor(); }
-  ReceiveBuffer receive_buffer() const override { return inner_.receive_buffer(); }
-  DatagramFaults refused_datagrams() const override { return inner_.refused_datagrams(); }
+  bus::ReceiveBuffer receive_buffer() const override { return inner_.receive_buffer(); }
+  bus::DatagramFaults refused_datagrams() const override { return inner_.refused_datagrams(); }
 
   /// Sends everything that is held back, in order.
   void flush();
@@ -72,11 +72,11 @@ class FaultyBus : public Bus {
   void flood(std::string_view channel);
   void release_due();
 
-  Bus& inner_;
+  bus::Bus& inner_;
   FaultPlan plan_;
   std::mt19937_64 random_;
   std::deque<Held> held_;
   FaultCounts counts_;
 };
 
-}  // namespace understory::bus
+}  // namespace understory::test
