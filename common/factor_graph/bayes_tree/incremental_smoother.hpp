@@ -73,10 +73,6 @@ class IncrementalSmoother {
   void remove(graph::FactorId id);
   /// Removes a variable with all its factors.
   void remove(graph::VariableId id);
-  /// Takes variables out and leaves their information about their neighbours as one linear factor,
-  /// linearised here. False (and nothing is removed) where the variables' own factors do not
-  /// determine them.
-  bool marginalise(std::span<const graph::VariableId> ids);
 
   /// The next changes will be of this variable and of what its factors tie it to: they are
   /// eliminated last, wherever else the graph is changed meanwhile. Where nothing is expected, that

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,22 +14,17 @@ namespace understory::factor_graph::files {
 /// Collects vertices and edges as g2o text.
 class G2oWriter {
  public:
-  /// `digits` of a number; none = the fewest that read back as the same number.
-  explicit G2oWriter(std::optional<int> digits = std::nullopt) : digits_(digits) {}
+  /// `digits` of a number.
+  explicit G2oWriter(int digits) : digits_(digits) {}
 
-  /// A variable at its value (as many numbers as its type has; of 3-D poses position and
-  /// quaternion x, y, z, w). False where g2o has no tag for it.
+  /// A pose or a point of the plane (as many numbers as its type has). False for other types.
   bool vertex(graph::VariableType type, std::uint64_t number, std::span<const double> value);
   /// Holds a vertex fast.
   void fix(std::uint64_t number);
-  /// A measurement between two vertices: relative poses and Cartesian observations of points.
-  /// `information` of a rotation is of its rotation vector. False where g2o has no tag for it.
+  /// A measurement between two vertices of the plane: relative poses and Cartesian observations of
+  /// points. False for other kinds.
   bool edge(graph::FactorKind kind, std::span<const std::uint64_t> vertices,
-            std::span<const double> measurement, Eigen::MatrixXd information);
-  /// The sensor that observations of 3-D points refer to, at the vehicle's origin; once, before
-  /// such edges.
-  void sensor_at_origin() { out_ += "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n"; }
-
+            std::span<const double> measurement, const Eigen::MatrixXd& information);
   /// The text so far; the writer is empty afterwards.
   std::string take();
 
@@ -38,7 +32,7 @@ class G2oWriter {
   void number(double value);
   void integer(std::uint64_t value) { out_ += ' ' + std::to_string(value); }
 
-  std::optional<int> digits_;
+  int digits_;
   std::string out_;
 };
 
