@@ -71,16 +71,6 @@ double shared_reach_m(const SensorParameters& sensor, const SharedErrorParameter
 
 }  // namespace
 
-DriveParameters few_landmarks_drive() {
-  DriveParameters parameters;
-  parameters.path.interval = 1.0;
-  parameters.sensor.range_m = 20.0;
-  parameters.sensor.view_rad = std::numbers::pi;
-  parameters.sensor.position_sigma_m = 0.03;
-  parameters.trunks_in_view = 2.8;
-  return parameters;
-}
-
 SimulatedScan observe(const Forest& forest, const PointGrid& grid,
                       const geometry::SE2& world_T_vehicle, const SensorParameters& sensor,
                       std::mt19937_64& random, const SharedErrorsAt& shared) {

@@ -93,12 +93,8 @@ struct DriveParameters {
   WheelOdometryParameters wheels;
 };
 
-/// A one-plane laser that looks ahead and sees trunks up to 20 m, two or three per scan, one scan
-/// per metre, with 3 cm of noise each.
-DriveParameters few_landmarks_drive();
-
-/// Scans are computed on request, each from its own random stream: a drive of any length needs no
-/// memory, and scan k does not depend on earlier calls.
+/// Scans are made when asked for, each from a stream of its own: a drive of any length costs no
+/// memory, and scan k is the same whichever were asked for before.
 class Drive {
  public:
   /// A forest, a path and a start pose from `seed`. Throws std::runtime_error if the path does not

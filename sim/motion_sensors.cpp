@@ -18,14 +18,6 @@ Eigen::Vector3d limited(const Eigen::Vector3d& value, double limit) {
 
 }  // namespace
 
-ImuParameters ImuParameters::perfect() {
-  ImuParameters p;
-  p.gyro_noise = p.gyro_bias_sigma = p.gyro_bias_walk = 0.0;
-  p.accelerometer_noise = p.accelerometer_bias_sigma = p.accelerometer_bias_walk = 0.0;
-  p.scale_sigma = 0.0;
-  return p;
-}
-
 model::ImuSample true_imu_sample(const VehicleState& state,
                                  const Eigen::Isometry3d& vehicle_T_sensor) {
   const Eigen::Vector3d& rate = state.angular_rate_rad_s;

@@ -30,9 +30,6 @@ struct ImuParameters {
   double gyro_limit_rad_s = 0.0;           ///< Saturation; 0 = never.
   double accelerometer_limit_mps2 = 0.0;   ///< Saturation; 0 = never.
   Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(1.0, 0.0, 0.6));
-
-  /// Without any error.
-  static ImuParameters perfect();
 };
 
 /// Measurement of an ideal inertial unit: frame `sensor`, at the sensor's position.
@@ -50,9 +47,7 @@ class SimulatedImu {
   model::ImuSample next(const VehicleMotion& motion, model::Utime utime_of_start = 0);
 
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< Of the last sample [rad/s].
-  /// Of the last sample [m/s^2].
-  const Eigen::Vector3d& accelerometer_bias() const { return accelerometer_bias_; }
-  /// The parameters of the constructor.
+  /// As given to the constructor.
   const ImuParameters& parameters() const { return parameters_; }
 
  private:

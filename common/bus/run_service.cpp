@@ -13,6 +13,7 @@
 #include "common/bus/live_bus.hpp"
 #include "common/bus/process_memory.hpp"
 #include "common/bus/service.hpp"
+#include "common/model/program_version.hpp"
 
 namespace understory::bus {
 namespace {
@@ -220,7 +221,7 @@ int run_service(const Service& service, int argc, char** argv) {
                "Allow a TTL above 0: other computers hear the bus and can send to it")
       ->envname("UNDERSTORY_OPEN_BUS");
   app.add_flag("--print-config", options.prints_config, "Print the configuration file in force");
-  app.set_version_flag("--version", program_version());
+  app.set_version_flag("--version", model::program_version());
   try {
     app.footer(service.channels.help() + "\n" + parameters_help(service));
     app.parse(argc, argv);

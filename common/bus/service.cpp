@@ -40,12 +40,10 @@ void describe(RuntimeParameters& parameters, ParameterTable& table) {
       "came late, until a quarter of that is left.");
 }
 
-std::string program_version() { return model::program_version(); }
-
 NodeOptions node_options(const std::string& process, const RuntimeParameters& parameters) {
   NodeOptions options;
   options.process = process + parameters.channel_suffix;
-  options.version = program_version();
+  options.version = model::program_version();
   options.channel_suffix = parameters.channel_suffix;
   options.suffixed_inputs = split_at_commas(parameters.suffixed_inputs);
   options.largest_clock_jump_us = static_cast<model::Utime>(parameters.largest_clock_jump_s * 1e6);

@@ -54,9 +54,6 @@ struct RuntimeParameters {
 /// Lists them in `table`, bound to `parameters`, which must outlive it.
 void describe(RuntimeParameters& parameters, ParameterTable& table);
 
-/// The version that HEALTH and CONFIG show.
-std::string program_version();
-
 /// The options that follow from the parameters.
 NodeOptions node_options(const std::string& process, const RuntimeParameters& parameters);
 

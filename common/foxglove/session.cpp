@@ -16,7 +16,6 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kMessageData = 0x01;  // Opcodes of the server's binary messages.
-constexpr char kTime = 0x02;
 /// What clients may ask of servers that offer it.
 constexpr std::array<std::string_view, 10> kOtherRequests{"advertise",
                                                           "unadvertise",
@@ -35,7 +34,7 @@ std::string server_info(const SessionOptions& options) {
   out.field("op", "serverInfo");
   out.field("name", terminal::printable(options.name));
   out.key("capabilities");
-  out.raw(options.sends_time ? R"(["time"])" : "[]");
+  out.raw("[]");
   out.key("metadata");
   out.raw("{}");
   if (!options.session_id.empty()) {
@@ -229,20 +228,10 @@ void Session::offer(const Converted& message) {
   counts_.dropped += to.waiting.offer(message, turns_++, options_.line);
 }
 
-void Session::offer_time(std::int64_t utime) {
-  if (options_.sends_time) time_ = utime;
-}
-
 std::optional<Outgoing> Session::next() {
   if (!replies_.empty()) {
     Outgoing out{false, std::move(replies_.front())};
     replies_.pop_front();
-    return out;
-  }
-  if (time_) {
-    Outgoing out{true, std::string(1, kTime)};
-    append_integer(out.bytes, nanoseconds(*time_), 8);
-    time_.reset();
     return out;
   }
 
@@ -277,12 +266,6 @@ std::vector<TopicId> Session::take_wanted() {
 
 bool Session::should_close() const {
   return counts_.malformed + counts_.not_supported >= options_.most_refused;
-}
-
-bool Session::has_next() const {
-  return !replies_.empty() || time_ || std::ranges::any_of(lines_, [](const Line& one) {
-    return one.waiting.turn().has_value();
-  });
 }
 
 std::size_t Session::waiting_bytes() const {

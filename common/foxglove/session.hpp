@@ -38,8 +38,7 @@ struct Outgoing {
 /// What a session says of its server, and its bounds.
 struct SessionOptions {
   std::string name = "understory";
-  std::string session_id = {};  ///< Tells runs of the server apart; empty = none.
-  bool sends_time = false;      ///< offer_time() is used: the client's clock follows the log's.
+  std::string session_id = {};               ///< Tells runs of the server apart; empty = none.
   std::size_t most_text_bytes = 64 * 1024;   ///< Of one message of the client.
   LineBounds line = {256, 8 * 1024 * 1024};  ///< Of each topic, what may wait.
   std::size_t most_replies = 64;             ///< Status messages that wait.
@@ -74,8 +73,6 @@ class Session {
   Taken take_binary(std::span<const std::uint8_t> bytes);
   /// Queues a message where the client subscribed to its topic; O(1) but for dropping.
   void offer(const Converted& message);
-  /// Queues the time of the log [us]; the newest counts.
-  void offer_time(std::int64_t utime);
   /// The next message to send: replies first, then topics in the order in which they came.
   std::optional<Outgoing> next();
 
@@ -85,8 +82,6 @@ class Session {
   bool is_subscribed(TopicId id) const { return line(id).subscription.has_value(); }
   /// Whether it sent so much that is refused that the connection should be closed.
   bool should_close() const;
-  /// Whether next() has something.
-  bool has_next() const;
   /// Bytes of messages that wait.
   std::size_t waiting_bytes() const;
   /// So far.
@@ -112,7 +107,6 @@ class Session {
   std::deque<std::string> replies_;
   std::array<Line, kTopics> lines_;
   std::map<std::uint32_t, TopicId> subscriptions_;  ///< By the client's id.
-  std::optional<std::int64_t> time_;
   std::uint64_t turns_ = 0;
   SessionCounts counts_;
 };

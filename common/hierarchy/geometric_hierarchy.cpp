@@ -218,18 +218,4 @@ std::vector<HierarchyEdge> edges(const GeometricHierarchy& hierarchy) {
   return result;
 }
 
-std::vector<std::vector<std::uint64_t>> polygon_ids(const GeometricHierarchy& hierarchy) {
-  std::vector<std::vector<std::uint64_t>> result;
-  for (const Polygon& polygon : hierarchy.polygons()) {
-    if (polygon.exists()) {
-      auto& ids = result.emplace_back();
-      for (const std::uint32_t slot : polygon.boundary) {
-        ids.push_back(hierarchy.triangulation().id(slot));
-      }
-    }
-  }
-  std::sort(result.begin(), result.end());
-  return result;
-}
-
 }  // namespace understory::hierarchy

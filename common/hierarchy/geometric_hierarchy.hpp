@@ -100,8 +100,4 @@ struct HierarchyEdge {
 /// Every edge once, in order of ids.
 std::vector<HierarchyEdge> edges(const GeometricHierarchy& hierarchy);
 
-/// Landmark ids along each polygon's boundary, each as Polygon::boundary has it, in lexicographic
-/// order: equal for equal sets of landmarks.
-std::vector<std::vector<std::uint64_t>> polygon_ids(const GeometricHierarchy& hierarchy);
-
 }  // namespace understory::hierarchy

@@ -385,10 +385,4 @@ ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& positi
   return ChangeStatus::kDone;
 }
 
-std::optional<std::uint32_t> Triangulation::nearest(const Eigen::Vector2d& position_m) const {
-  const Impl::Vertex vertex =
-      impl_->delaunay.nearest_vertex(Impl::to_cgal(position_m), impl_->start_near(position_m));
-  return vertex == Impl::Vertex() ? std::nullopt : std::optional(vertex->info());
-}
-
 }  // namespace understory::hierarchy

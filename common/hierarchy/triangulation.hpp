@@ -95,8 +95,6 @@ class Triangulation {
   std::size_t slot_count() const { return ids_.size(); }
   /// Whether the slot is in use.
   bool is_landmark(std::uint32_t slot) const;
-  /// The slot of the landmark nearest to a place (ties: whichever is found first); none if empty.
-  std::optional<std::uint32_t> nearest(const Eigen::Vector2d& position_m) const;
 
  private:
   struct Impl;

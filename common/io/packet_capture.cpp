@@ -169,7 +169,6 @@ class PacketCapture::Impl {
     }
 
     if (packet) packet->sender = fragment->sender;
-    if (!packet) ++counts_.not_udp;
     return packet;
   }
 

@@ -24,7 +24,6 @@ struct CapturedPacket {
 /// What was in the file so far.
 struct CaptureCounts {
   std::uint64_t frames = 0;
-  std::uint64_t not_udp = 0;     ///< Other protocols, cut off: passed over.
   std::uint64_t fragments = 0;   ///< Of UDP packets that are larger than a frame.
   std::uint64_t incomplete = 0;  ///< UDP packets of which fragments are missing: left out.
 };

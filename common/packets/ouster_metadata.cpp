@@ -34,11 +34,6 @@ constexpr std::array<OusterProfile, 10> kProfiles{{
     {"RNG19_RFL8_SIG16_NIR16_ZONE16", OusterPixel::kSingle, 12},
 }};
 
-constexpr std::array<std::pair<std::string_view, OusterTimeMode>, 3> kTimeModes{
-    {{"TIME_FROM_INTERNAL_OSC", OusterTimeMode::kInternal},
-     {"TIME_FROM_SYNC_PULSE_IN", OusterTimeMode::kSyncPulse},
-     {"TIME_FROM_PTP_1588", OusterTimeMode::kPtp}}};
-
 /// Where a field is: in a section of the nested layout, or at the top of the flat one.
 class Fields {
  public:
@@ -165,23 +160,6 @@ std::optional<double> columns_of_mode(const std::string& mode) {
   return static_cast<double>(columns);
 }
 
-void read_product(const Fields& fields, OusterMetadata& metadata) {
-  metadata.product_line = fields.text("sensor_info", "prod_line");
-  metadata.serial_number = fields.text("sensor_info", "prod_sn");
-  const std::string mode = fields.text("config_params", "timestamp_mode");
-  const auto known = std::ranges::find(kTimeModes, mode, [](const auto& m) { return m.first; });
-  if (known != kTimeModes.end()) metadata.time_mode = known->second;
-  const auto multiplier = fields.number("config_params", "signal_multiplier");
-  metadata.signal_multiplier = multiplier.value_or(1.0);
-  const auto port = [&](const char* name) -> std::optional<int> {
-    const auto number = fields.number("config_params", name);
-    if (!number) return std::nullopt;
-    return static_cast<int>(fields.whole(name, *number, 0, 65535));
-  };
-  metadata.lidar_port = port("udp_port_lidar");
-  metadata.imu_port = port("udp_port_imu");
-}
-
 void read_format(const Fields& fields, OusterMetadata& metadata) {
   std::string profile = fields.text("lidar_data_format", "udp_profile_lidar");
   if (profile.empty()) profile = fields.text("config_params", "udp_profile_lidar");
@@ -243,15 +221,10 @@ std::optional<OusterProfile> ouster_profile(std::string_view name) {
   return found == kProfiles.end() ? std::nullopt : std::optional(*found);
 }
 
-std::string_view to_string(OusterTimeMode mode) {
-  const auto found = std::ranges::find(kTimeModes, mode, [](const auto& m) { return m.second; });
-  return found == kTimeModes.end() ? "unknown" : found->first;
-}
-
 OusterMetadata parse_ouster_metadata(std::string_view text, const std::string& source) {
   const Fields fields(text, source);
   OusterMetadata metadata;
-  read_product(fields, metadata);
+  metadata.product_line = fields.text("sensor_info", "prod_line");
   read_format(fields, metadata);
   read_geometry(fields, metadata);
   return metadata;

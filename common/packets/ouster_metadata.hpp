@@ -34,22 +34,10 @@ std::span<const OusterProfile> ouster_profiles();
 /// By its name; none for another.
 std::optional<OusterProfile> ouster_profile(std::string_view name);
 
-/// Whose time the packets have: `timestamp_mode`.
-enum class OusterTimeMode : std::uint8_t {
-  kInternal,   ///< TIME_FROM_INTERNAL_OSC: counts from power-on.
-  kSyncPulse,  ///< TIME_FROM_SYNC_PULSE_IN: the time of day where the sensor gets NMEA, too.
-  kPtp,        ///< TIME_FROM_PTP_1588: the master's, usually TAI.
-  kUnknown,    ///< Older metadata do not say, or something else.
-};
-/// As the metadata names it; "unknown".
-std::string_view to_string(OusterTimeMode mode);
-
 /// What the decoder needs of the metadata. Translations are in metres (the file has millimetres).
 struct OusterMetadata {
   std::string product_line;  ///< "OS-1-64"; empty = not told.
-  std::string serial_number;
   OusterProfile profile = {"LEGACY"};
-  OusterTimeMode time_mode = OusterTimeMode::kUnknown;
   std::size_t columns_per_frame = 1024;
   std::size_t columns_per_packet = 16;
   std::size_t first_column = 0;  ///< The azimuth window; it may go through column 0.
@@ -59,9 +47,6 @@ struct OusterMetadata {
   Eigen::Isometry3d lidar_T_beam = Eigen::Isometry3d::Identity();  ///< At encoder angle 0.
   Eigen::Isometry3d sensor_T_lidar = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d sensor_T_imu = Eigen::Isometry3d::Identity();
-  double signal_multiplier = 1.0;  ///< Above 1 with a narrower azimuth window; ranges stay.
-  std::optional<int> lidar_port;   ///< UDP, where the sensor sends to.
-  std::optional<int> imu_port;
 
   std::size_t beams() const { return altitude_rad.size(); }  ///< 16, 32, 64 or 128.
 };

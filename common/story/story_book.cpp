@@ -1,7 +1,6 @@
 #include "common/story/story_book.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 
 #include "common/wire/convert.hpp"
@@ -30,14 +29,6 @@ Limits Limits::of_a_log() {
 
 StoryBook::StoryBook(const Limits& limits)
     : landmarks_(limits, landmark_bytes(limits)), poses_(limits) {}
-
-bool StoryBook::wants(std::string_view channel) {
-  constexpr std::array<std::string_view, 15> kChannels{
-      "SLAM_POSE", "SLAM_UPDATE",    "MAP",      "MAP_DELTA", "SUBMAP",
-      "EXISTENCE", "MAP_CORRECTION", "KEYFRAME", "LANDMARKS", "TRACKED_LANDMARKS",
-      "ODOMETRY",  "EKF_POSE",       "RAW_SCAN", "RAW_SWEEP", "LIDAR_SCAN"};
-  return channel == "LIDAR_SWEEP" || std::ranges::find(kChannels, channel) != kChannels.end();
-}
 
 void StoryBook::take(std::string_view channel, std::span<const std::uint8_t> bytes,
                      std::int64_t received_us) {

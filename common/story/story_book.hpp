@@ -21,8 +21,6 @@ class StoryBook {
   /// Empty.
   explicit StoryBook(const Limits& limits = {});
 
-  /// Whether messages of this channel say anything to it.
-  static bool wants(std::string_view channel);
   /// Takes a message as it came, of any version; what is malformed is counted and passed over, and
   /// so are other channels. `received_us` is the wall clock when it came, 0 where not known.
   void take(std::string_view channel, std::span<const std::uint8_t> bytes,

@@ -9,10 +9,6 @@ double ComparedPose::position_error_m() const {
   return (world_T_vehicle.translation() - true_world_T_vehicle.translation()).norm();
 }
 
-double ComparedPose::heading_error_rad() const {
-  return std::abs(geometry::wrap_angle(world_T_vehicle.theta() - true_world_T_vehicle.theta()));
-}
-
 double mean(const std::vector<double>& values) {
   double sum = 0.0;
   for (const double value : values) sum += value;

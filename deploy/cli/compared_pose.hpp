@@ -23,8 +23,6 @@ struct ComparedPose {
 
   /// Distance between the two positions.
   double position_error_m() const;
-  /// Absolute difference of the headings.
-  double heading_error_rad() const;
 };
 
 double mean(const std::vector<double>& values);     ///< 0 of none.

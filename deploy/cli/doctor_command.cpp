@@ -10,6 +10,7 @@
 #include "common/bus/bulk_group.hpp"
 #include "common/bus/launch_config.hpp"
 #include "common/bus/service.hpp"
+#include "common/model/program_version.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/printable.hpp"
 #include "deploy/cli/commands.hpp"
@@ -95,7 +96,7 @@ void look_at_bus(const std::string& url, std::vector<Finding>& findings) {
   findings.push_back(
       clock_jump_finding(microseconds(DoctorClock::now() - start),
                          microseconds(std::chrono::system_clock::now() - start_by_clock)));
-  add(process_findings(heard, local_processes(), bus::program_version()));
+  add(process_findings(heard, local_processes(), model::program_version()));
 }
 
 void doctor(const DoctorOptions& options) {
@@ -104,7 +105,7 @@ void doctor(const DoctorOptions& options) {
   findings.push_back(receive_buffer_finding());
   findings.push_back(clock_finding());
   findings.push_back(state_finding(options.state.string()));
-  for (Finding& one : program_findings(launched_programs(), bus::program_version()))
+  for (Finding& one : program_findings(launched_programs(), model::program_version()))
     findings.push_back(std::move(one));
   for (Finding& one : tool_findings()) findings.push_back(std::move(one));
   std::vector<Finding> bus;

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/bus/clock.hpp"
-#include "common/bus/service.hpp"
+#include "common/model/program_version.hpp"
 #include "common/wire/convert.hpp"
 #include "understory/health_t.hpp"
 
@@ -21,7 +21,7 @@ std::string why_given_up(const launch::ProcessStatus& process) {
 }  // namespace
 
 LaunchVoice::LaunchVoice(const std::string& lcm_url)
-    : bus_(lcm_url), announcer_(bus_, "launch", bus::program_version()) {}
+    : bus_(lcm_url), announcer_(bus_, "launch", model::program_version()) {}
 
 void LaunchVoice::tell(const std::vector<launch::ProcessStatus>& processes,
                        launch::Clock::time_point now) {
@@ -50,7 +50,7 @@ void LaunchVoice::publish_health(const launch::ProcessStatus& process) {
   health.utime = bus::system_clock().wall_us();
   health.seq = sequences_[process.name]++;
   health.process = process.name;
-  health.version = bus::program_version();
+  health.version = model::program_version();
   health.state = health_t::STATE_ERROR;
   health.message_utime = -1;
   health.snapshot_utime = -1;

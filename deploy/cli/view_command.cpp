@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/bus/clock.hpp"
-#include "common/bus/service.hpp"
+#include "common/model/program_version.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
@@ -136,7 +136,7 @@ void view_logs(const ViewOptions& options) {
     return hosted.at(question.value("run", std::size_t{0}))->answer(question);
   };
   PageHost host(options.page, runs, std::move(requests),
-                {{"version", bus::program_version()},
+                {{"version", model::program_version()},
                  {"mode", "log"},
                  {"runs", names},
                  {"log", {{"from", span.from_us}, {"to", span.to_us}}}});
@@ -190,7 +190,7 @@ void view_map(const ViewOptions& options) {
     show_both();
   };
   PageHost host(options.page, {&shown, &compared}, std::move(requests),
-                {{"version", bus::program_version()},
+                {{"version", model::program_version()},
                  {"mode", "map"},
                  {"runs",
                   {{{"name", options.map}, {"colour_index", 0}},

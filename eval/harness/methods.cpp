@@ -40,11 +40,6 @@ Stages baseline_stages() {
 
 }  // namespace
 
-const std::vector<std::string>& method_names() {
-  static const std::vector<std::string> names{"baseline", "smoothing"};
-  return names;
-}
-
 Stages make_stages(std::string_view method, double hand_over_m) {
   if (method == "baseline") return baseline_stages();
   if (method == "smoothing") return own_stages(hand_over_m);

@@ -43,11 +43,9 @@ struct Stages {
   Mapping mapper;
 };
 
-/// Names of the methods that make_stages() takes: "baseline", "smoothing".
-const std::vector<std::string>& method_names();
-/// New stages of a method with its parameters as published. What is farther than `hand_over_m` from
-/// the vehicle leaves the mapper of "smoothing"; 0: nothing. Throws std::invalid_argument for an
-/// unknown name.
+/// New stages of a method ("baseline", "smoothing") with its parameters as published. What is
+/// farther than `hand_over_m` from the vehicle leaves the mapper of "smoothing"; 0: nothing. Throws
+/// std::invalid_argument for an unknown name.
 Stages make_stages(std::string_view method, double hand_over_m = 0.0);
 
 /// What became of a scan that completed a keyframe.

@@ -188,14 +188,4 @@ Eigen::Matrix3d BatchOracle::covariance(std::size_t scan_index, double sigma_m) 
   return sigma_m * sigma_m * vehicle_R_map * in_map * vehicle_R_map.transpose();
 }
 
-double BatchOracle::cost() const {
-  double sum = 0.0;
-  for (const Scan& scan : scans_) {
-    for (std::size_t i = 0; i < scan.landmarks.size(); ++i) {
-      sum += (scan.pose * scan.positions_m[i] - landmarks_[scan.landmarks[i]]).squaredNorm();
-    }
-  }
-  return sum;
-}
-
 }  // namespace understory::eval::metrics

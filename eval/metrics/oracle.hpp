@@ -50,8 +50,6 @@ class BatchOracle {
   /// Covariance of a pose (tangent order, right perturbation) for detections with the given sigma
   /// per axis. Precondition: solve() after the last add().
   Eigen::Matrix3d covariance(std::size_t scan, double sigma_m) const;
-  /// Sum of squared residuals [m^2].
-  double cost() const;
 
  private:
   struct Scan {

@@ -114,14 +114,10 @@ Localisation Associator::locate(const std::vector<Observation>& observations,
   if (!motion_.last_scan()) return {};
 
   const PredictedMotion predicted = motion_.predict(scan.utime);
-  if (predicted.is_extrapolated) ++counters_.scans_without_motion;
   const geometry::SE2WithCovariance guess{local_T_vehicle_ * predicted.last_T_now.mean,
                                           predicted.last_T_now.covariance};
 
-  Localisation located =
-      associator::locate(tracks_.tracks(), observations, scan.field_of_view, guess, parameters_);
-  if (located.was_searched) ++counters_.searches;
-  return located;
+  return associator::locate(tracks_.tracks(), observations, scan.field_of_view, guess, parameters_);
 }
 
 /// After passing traffic or a burst of false detections the next scan is likely to fit; the
@@ -142,10 +138,8 @@ std::vector<model::TrackId> Associator::update_tracks(const std::vector<Observat
     });
   }
 
-  const model::TrackId before = tracks_.next_id();
   auto ids =
       tracks_.update(observations, matches, local_T_vehicle_, scan.field_of_view, scan.utime);
-  counters_.tracks_confirmed += tracks_.next_id() - before;
   counters_.ambiguous += static_cast<std::uint64_t>(
       std::ranges::count_if(matches, [](const Match& match) { return match.ambiguous; }));
   return ids;

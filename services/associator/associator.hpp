@@ -21,18 +21,15 @@ namespace understory::associator {
 
 /// Counts for HEALTH, since the process started.
 struct AssociatorCounters {
-  std::uint64_t scans = 0;                 ///< Received.
-  std::uint64_t scans_refused = 0;         ///< Late or repeated.
-  std::uint64_t scans_passed_over = 0;     ///< Fitted no track; the tracks were kept.
-  std::uint64_t scans_lost = 0;            ///< Fitted no track again; all tracks began anew.
-  std::uint64_t scans_without_motion = 0;  ///< Predicted by the last motion alone.
-  std::uint64_t detections = 0;            ///< Received.
-  std::uint64_t detections_unusable = 0;   ///< Not finite, or without a covariance.
-  std::uint64_t published = 0;             ///< Detections with a track id.
-  std::uint64_t ambiguous = 0;             ///< Matched, but not published.
-  std::uint64_t tracks_confirmed = 0;      ///< Tracks that got an id.
-  std::uint64_t searches = 0;              ///< Scans with a search of the largest consistent set.
-  std::string last_reason;                 ///< Why the last scan was not used.
+  std::uint64_t scans = 0;                ///< Received.
+  std::uint64_t scans_refused = 0;        ///< Late or repeated.
+  std::uint64_t scans_passed_over = 0;    ///< Fitted no track; the tracks were kept.
+  std::uint64_t scans_lost = 0;           ///< Fitted no track once more; all tracks began anew.
+  std::uint64_t detections = 0;           ///< Received.
+  std::uint64_t detections_unusable = 0;  ///< Not finite, or without a covariance.
+  std::uint64_t published = 0;            ///< Detections with a track id.
+  std::uint64_t ambiguous = 0;            ///< Matched, but not published.
+  std::string last_reason;                ///< Why the last scan was not used.
 };
 
 /// Gives the detections of consistent landmarks an id that lasts as long as the track.

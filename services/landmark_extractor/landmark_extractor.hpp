@@ -44,9 +44,7 @@ class LandmarkExtractor {
   const model::ViewRanges& view() const { return view_; }
   /// Counts of planar scans.
   const ExtractorCounters& counters() const { return counters_; }
-  /// Walls and corners of planar scans.
-  const corners::CornerCounters& planar_corner_counters() const { return corners_.counters(); }
-  /// Counts of 3-D sweeps.
+  /// Of sweeps in space.
   const SweepCounters& sweep_counters() const { return sweeps_.counters(); }
 
  private:

@@ -69,9 +69,7 @@ class VelodyneDriver {
   const VelodyneDriverCounts& counts() const { return counts_; }  ///< Since the start.
   /// The counts, for LOG.
   std::string summary(const lidar_driver::SocketCounts& sockets) const;
-  /// Offset of the computer's clock minus the sensor's [us].
-  std::optional<model::Utime> clock_offset_us() const { return clock_.offset_us(); }
-  /// Present fault of the sensor's clock, if any.
+  /// What is wrong with the sensor's clock now, if anything is.
   std::optional<wire::Refusal> clock_fault() const;
 
  private:

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "common/bus/device.hpp"
+#include "common/model/program_version.hpp"
 #include "services/viewer/adapter_parameters.hpp"
 #include "services/viewer/page_bundle.hpp"
 #include "services/viewer/page_host.hpp"
@@ -47,7 +48,7 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
     PageRequests requests;
     requests.story = [this](const nlohmann::json& question) { return run_.answer(question); };
     host_.emplace(parameters_.page, std::vector<const Scene*>{&run_.scene()}, std::move(requests),
-                  nlohmann::ordered_json{{"version", bus::program_version()},
+                  nlohmann::ordered_json{{"version", model::program_version()},
                                          {"mode", "live"},
                                          {"runs", {{{"name", "live"}, {"colour_index", 0}}}}});
     const std::string page =

@@ -80,19 +80,6 @@ TEST_CASE("a subscribed topic comes as binary messages, others do not") {
   REQUIRE(session.take_text(subscribe_text(77, TopicId::kPose)) == Taken::kDone);
 }
 
-TEST_CASE("time goes along where it is promised") {
-  SessionOptions options;
-  options.sends_time = true;
-  Session session(options);
-  drained(session);
-  session.offer_time(1);
-  session.offer_time(5);
-  const auto out = drained(session);
-  REQUIRE(out.size() == 1);
-  REQUIRE(out[0].bytes[0] == 2);
-  REQUIRE(integer_at<std::uint64_t>(out[0].bytes, 1) == 5000);
-}
-
 TEST_CASE("what breaks the rules is refused, counted and answered") {
   Session session;
   drained(session);

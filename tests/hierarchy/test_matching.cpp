@@ -22,6 +22,19 @@ Tally judge(const std::vector<LandmarkMatch>& pairs) {
   return tally;
 }
 
+/// Landmark ids along each polygon's boundary, in lexicographic order.
+std::vector<std::vector<std::uint64_t>> polygon_ids(const GeometricHierarchy& hierarchy) {
+  std::vector<std::vector<std::uint64_t>> result;
+  for (const Polygon& polygon : hierarchy.polygons()) {
+    if (!polygon.exists()) continue;
+    auto& ids = result.emplace_back();
+    for (const std::uint32_t slot : polygon.boundary)
+      ids.push_back(hierarchy.triangulation().id(slot));
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
 geometry::SE2 random_pose(std::mt19937_64& random) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   return {100.0 * unit(random), 100.0 * unit(random), 3.1 * unit(random)};

@@ -256,21 +256,3 @@ TEST_CASE("Fewer than three landmarks, or all in one line, have no triangles", "
 
   REQUIRE(triangulation.triangle_count() == 0);
 }
-
-TEST_CASE("The nearest landmark is found", "[hierarchy]") {
-  std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> coordinate(-100.0, 100.0);
-  Triangulation triangulation;
-  TriangulationChange change;
-  REQUIRE_FALSE(triangulation.nearest({0.0, 0.0}));
-
-  for (std::uint64_t id = 0; id < 300; ++id) {
-    triangulation.insert(id, {coordinate(random), coordinate(random)}, change);
-    const Eigen::Vector2d place(coordinate(random), coordinate(random));
-    double best = std::numeric_limits<double>::infinity();
-    for (std::uint32_t slot = 0; slot < triangulation.slot_count(); ++slot) {
-      best = std::min(best, (triangulation.position(slot) - place).norm());
-    }
-    REQUIRE((triangulation.position(*triangulation.nearest(place)) - place).norm() == Approx(best));
-  }
-}

@@ -12,6 +12,7 @@ namespace {
 using packets::OusterMetadata;
 
 constexpr double kDeg = std::numbers::pi / 180.0;
+constexpr const char* kSerial = "122150000000";
 
 double uniform(double from, double to, std::mt19937_64& random) {
   return std::uniform_real_distribution<double>(from, to)(random);
@@ -279,9 +280,7 @@ packets::OusterMetadata random_ouster(const std::string& profile, std::size_t be
                                       std::size_t columns, std::mt19937_64& random) {
   OusterMetadata metadata;
   metadata.product_line = "OS-1-" + std::to_string(beams);
-  metadata.serial_number = "122150000000";
   metadata.profile = packets::ouster_profile(profile).value();
-  metadata.time_mode = packets::OusterTimeMode::kPtp;
   metadata.columns_per_frame = columns;
   metadata.last_column = columns - 1;
   for (std::size_t beam = 0; beam < beams; ++beam) {
@@ -312,11 +311,10 @@ std::string ouster_json(const OusterMetadata& metadata, bool is_nested) {
   const std::string mode = std::to_string(metadata.columns_per_frame) + "x10";
   nlohmann::json root;
   if (is_nested) {
-    root["sensor_info"] = {{"prod_line", metadata.product_line},
-                           {"prod_sn", metadata.serial_number}};
+    root["sensor_info"] = {{"prod_line", metadata.product_line}, {"prod_sn", kSerial}};
     root["config_params"] = {{"lidar_mode", mode},
-                             {"timestamp_mode", to_string(metadata.time_mode)},
-                             {"signal_multiplier", metadata.signal_multiplier},
+                             {"timestamp_mode", "TIME_FROM_PTP_1588"},
+                             {"signal_multiplier", 1.0},
                              {"udp_port_lidar", 7502},
                              {"udp_port_imu", 7503}};
     root["lidar_data_format"] = format;
@@ -327,7 +325,7 @@ std::string ouster_json(const OusterMetadata& metadata, bool is_nested) {
   } else {
     root = beams;
     root["prod_line"] = metadata.product_line;
-    root["prod_sn"] = metadata.serial_number;
+    root["prod_sn"] = kSerial;
     root["lidar_mode"] = mode;
     root["data_format"] = format;
     root["lidar_to_sensor_transform"] = by_rows(metadata.sensor_T_lidar);

@@ -140,7 +140,10 @@ TEST_CASE("The car drives off from a stop as it does from the start", "[motion]"
 
 TEST_CASE("A perfect inertial unit integrates back to the drive", "[imu]") {
   const VehicleMotion motion = motion_on(PathKind::kFigureEight, 300.0);
-  ImuParameters parameters = ImuParameters::perfect();
+  ImuParameters parameters;
+  parameters.gyro_noise = parameters.gyro_bias_sigma = parameters.gyro_bias_walk = 0.0;
+  parameters.accelerometer_noise = parameters.accelerometer_bias_sigma = 0.0;
+  parameters.accelerometer_bias_walk = parameters.scale_sigma = 0.0;
   parameters.vehicle_T_sensor = Eigen::Translation3d(0.7, -0.2, 0.5) *
                                 Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized());
   SimulatedImu imu(parameters, 1);

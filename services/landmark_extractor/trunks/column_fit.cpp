@@ -227,12 +227,6 @@ void StemFitter::describe(const Vector6d& state, StemFit& fit) const {
     for (const float counts : group.counts) terms += counts;
   }
   fit.mean_square_residual = squares / terms;
-  for (const EdgeLanes& group : used_.edges()) {
-    for (const float side : group.side) {
-      if (side > 0.0F) fit.sees_left = true;
-      if (side < 0.0F) fit.sees_right = true;
-    }
-  }
 
   // Is it more likely a strip of a wall?
   const PlaneComparison plane =

@@ -24,8 +24,6 @@ struct StemFit {
   double flat_excess = 0.0;  ///< chi^2 of an upright plane minus that of the stem, for the hits.
   std::size_t points = 0;    ///< On runs that agree.
   std::size_t rings = 0;     ///< Of runs that agree.
-  bool sees_left = false;    ///< It has an edge on that side.
-  bool sees_right = false;   ///< It has an edge on that side.
 
   /// Of the axis at a height, frame `vehicle_level`.
   Eigen::Vector2d centre_at(double z_m) const {

@@ -95,9 +95,7 @@ void serve(const std::string& log) {
   std::cout << acceptor.local_endpoint().port() << std::endl;
   Socket socket = accepted(context, acceptor);
 
-  foxglove::SessionOptions options;
-  options.sends_time = true;
-  foxglove::Session session(options);
+  foxglove::Session session;
   Receiver receiver(socket, session);
   while (!has_subscription(session)) {
     send_waiting(socket, session);
@@ -113,7 +111,6 @@ void serve(const std::string& log) {
         session.offer(one);
       }
       bring_up_to_date(session, converter);
-      session.offer_time(event->utime);
       send_waiting(socket, session);
     }
   }
