@@ -84,21 +84,6 @@ std::optional<SensorReading> SensorDrive::read(Source source) {
   return std::nullopt;
 }
 
-/// False if the source has no reading.
-bool SensorDrive::skip(Source source) {
-  if (source == Source::kLidar) return ++revolutions_, true;
-  if (source == Source::kPlanarLaser) return ++scans_, true;
-  return read(source).has_value();  // errors are correlated in time
-}
-
-bool SensorDrive::skip() {
-  for (;;) {
-    const Due due = next_due();
-    if (!(due.time_s <= motion_.duration_s() + 1e-9)) return false;
-    if (skip(due.source)) return true;
-  }
-}
-
 std::optional<SensorReading> SensorDrive::next() {
   for (;;) {
     const Due due = next_due();

@@ -62,8 +62,6 @@ class SensorDrive {
 
   /// The next reading; none at the end of the drive.
   std::optional<SensorReading> next();
-  /// Skips the next reading, which is fast: no sweep and no scan is computed. False at the end.
-  bool skip();
 
   /// The world of the drive.
   const World& world() const { return *scenario_.world; }
@@ -92,7 +90,6 @@ class SensorDrive {
   };
   Due next_due() const;
   std::optional<SensorReading> read(Source source);
-  bool skip(Source source);
 
   Scenario scenario_;
   SensorSuite suite_;

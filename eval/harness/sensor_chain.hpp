@@ -59,10 +59,8 @@ class SensorChain {
     });
   }
 
-  /// State of every service, by name; what is on its way on the bus is none.
-  std::map<std::string, std::string> save() const;
-  /// Goes on from such states, before the first message. Throws where a service cannot.
-  void load(const std::map<std::string, std::string>& states);
+  /// State of a service as it saves itself. Throws std::out_of_range for an unknown name.
+  std::string state_of(std::string_view service) const;
 
   /// Processor time of a service. Throws std::out_of_range for an unknown name.
   const ServiceTime& time_of(std::string_view service) const;

@@ -91,7 +91,7 @@ TEST_CASE("with the setting that ships the smoother is at every moment where the
       // Of each moment, with the few residuals of its beginning as well.
       CHECK(moment.chi2 < 1.001 * moment.chi2_batch + 1e-2);
       sigmas.push_back(moment.newest.sigma);
-      for (const auto& seen : moment.seen) sigmas.push_back(seen.sigma);
+      sigmas.insert(sigmas.end(), moment.seen_sigma.begin(), moment.seen_sigma.end());
     }
   }
   REQUIRE(sigmas.size() > 300);

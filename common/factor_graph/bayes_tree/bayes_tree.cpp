@@ -47,9 +47,7 @@ void BayesTree::detach(int factor) {
   cliques_.remove_factor(factor);
 }
 
-TreeStatistics BayesTree::eliminate(std::span<const int> fresh, std::span<const int> last) {
-  TreeStatistics statistics;
-
+double BayesTree::eliminate(std::span<const int> fresh, std::span<const int> last) {
   // The variables that the new factors tie together are ordered anew.
   for (const int f : fresh) {
     for (const int v : graph_.variables_of(f)) mark_structure(v);
@@ -57,15 +55,15 @@ TreeStatistics BayesTree::eliminate(std::span<const int> fresh, std::span<const 
 
   // First the cliques that keep their structure, then the new ones above them.
   elimination_.list_dirty(marks_, computed_);
-  statistics.refreshed_cliques = static_cast<long>(computed_.size());
-  statistics.eliminated_variables = restructuring_.rebuild(fresh, last, marks_, computed_);
+  restructuring_.rebuild(fresh, last, marks_, computed_);
 
   // From here on the structure is final.
   marks_.clear();
   marks_.resize(cliques_.capacity());
   elimination_.factorise(computed_);
-  for (const int c : computed_) statistics.flops += flops_of(cliques_[c]);
-  return statistics;
+  double flops = 0.0;
+  for (const int c : computed_) flops += flops_of(cliques_[c]);
+  return flops;
 }
 
 void BayesTree::solve_everything(double threshold) {

@@ -17,13 +17,6 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Work of one elimination.
-struct TreeStatistics {
-  long eliminated_variables = 0;  ///< Variables whose cliques were planned and built anew.
-  long refreshed_cliques = 0;     ///< Cliques whose numbers alone were computed anew.
-  double flops = 0.0;             ///< Floating-point operations.
-};
-
 /// A factor graph as a tree of dense fronts: puts together its structure, what is out of date in
 /// it, and the steps that bring it up to date. State: cliques and marks; all else is scratch
 /// memory of the steps.
@@ -43,8 +36,8 @@ class BayesTree {
   void detach(int factor);
 
   /// Brings the marked part up to date. `fresh`: factors that no clique holds yet. `last`:
-  /// variables to be eliminated as late as possible.
-  TreeStatistics eliminate(std::span<const int> fresh, std::span<const int> last);
+  /// variables to be eliminated as late as possible. Gives its floating-point operations.
+  double eliminate(std::span<const int> fresh, std::span<const int> last);
 
   /// Back-substitution from the cliques that eliminate() computed, on as long as something changes.
   /// Moves the graph's variables; what would move by less than `threshold` [own conditional

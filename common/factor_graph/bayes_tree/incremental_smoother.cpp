@@ -161,12 +161,8 @@ void IncrementalSmoother::find_last() {
 
 void IncrementalSmoother::eliminate(IncrementalUpdate& update) {
   find_last();
-  const TreeStatistics statistics = tree_.eliminate(pending_.fresh, last_);
+  update.flops += tree_.eliminate(pending_.fresh, last_);
   pending_.fresh.clear();
-
-  update.eliminated_variables += statistics.eliminated_variables;
-  update.refreshed_cliques += statistics.refreshed_cliques;
-  update.flops += statistics.flops;
 }
 
 /// One step; false where it was taken back. `whole_loss`: of a step of the whole graph, the loss
@@ -208,7 +204,6 @@ IncrementalUpdate IncrementalSmoother::run(std::optional<double> whole_loss) {
            update.flops < std::max(kLittleWork, most_work * tree_.total_flops()) &&
            (!accepted || update.deviation > parameters_.iterate_above));
 
-  update.moved_variables = static_cast<long>(moved_.size());
   for (const int v : moved_) is_moved_[static_cast<std::size_t>(v)] = 0;
   finish(update);
   return update;

@@ -20,10 +20,7 @@ struct IncrementalUpdate {
   std::vector<graph::VariableId> undetermined;
   std::string error;              ///< Names them.
   int iterations = 0;             ///< Steps of linearisation, elimination and solution.
-  long eliminated_variables = 0;  ///< Variables whose cliques were built anew.
-  long refreshed_cliques = 0;     ///< Cliques computed anew with the same structure.
   long relinearised_factors = 0;  ///< Factors linearised again.
-  long moved_variables = 0;       ///< Variables that moved.
   double flops = 0.0;             ///< Floating-point operations of the eliminations.
   double deviation = 0.0;         ///< Largest one left between factor and linearisation [sigmas].
   bool is_settled = false;        ///< See settle().

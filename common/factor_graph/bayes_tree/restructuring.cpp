@@ -122,14 +122,13 @@ void Restructuring::build(const CliquePlan& plan, std::vector<int>& computed) {
   for (std::size_t i = first; i < computed.size(); ++i) link_to_parent(computed[i]);
 }
 
-long Restructuring::rebuild(std::span<const int> fresh, std::span<const int> last,
+void Restructuring::rebuild(std::span<const int> fresh, std::span<const int> last,
                             const Marks& marks, std::vector<int>& computed) {
   collect(fresh, marks);
   cliques_.remove(marks.structural());
   if (!affected_.empty()) build(plan(last), computed);
 
   for (const int v : affected_) affected_at_[static_cast<std::size_t>(v)] = graph::kNone;
-  return static_cast<long>(affected_.size());
 }
 
 }  // namespace understory::factor_graph::bayes_tree

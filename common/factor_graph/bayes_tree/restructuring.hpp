@@ -22,9 +22,8 @@ class Restructuring {
 
   /// Plans and builds. `fresh`: factors that no clique holds yet; the cliques of their variables
   /// must be marked. `last`: variables to be eliminated as late as possible. Appends the new
-  /// cliques to `computed`, children first, and returns the number of variables planned anew. Costs
-  /// what was marked, not what the tree holds.
-  long rebuild(std::span<const int> fresh, std::span<const int> last, const Marks& marks,
+  /// cliques to `computed`, children first. Costs what was marked, not what the tree holds.
+  void rebuild(std::span<const int> fresh, std::span<const int> last, const Marks& marks,
                std::vector<int>& computed);
 
  private:

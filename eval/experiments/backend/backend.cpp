@@ -28,32 +28,20 @@ VariableId newest_pose(const IncrementalSmoother& smoother) {
 }
 
 /// True for the updates after which a batch solver looks; of the last in any case.
-bool is_checkpoint(std::size_t k, std::size_t poses, int checkpoints) {
-  if (k + 1 == poses) return true;
-  const auto number = [&](std::size_t i) {
-    return i * static_cast<std::size_t>(checkpoints) / poses;
-  };
-  return checkpoints > 0 && number(k + 1) != number(k);
-}
-
-void count(BackendWork& work, const factor_graph::bayes_tree::IncrementalUpdate& update) {
-  work.eliminated += update.eliminated_variables;
-  work.refreshed += update.refreshed_cliques;
-  work.relinearised += update.relinearised_factors;
-  work.moved += update.moved_variables;
-  work.flops += update.flops;
+bool is_checkpoint(std::size_t k, std::size_t poses) {
+  constexpr std::size_t kCheckpoints = 50;
+  return k + 1 == poses || (k + 1) * kCheckpoints / poses != k * kCheckpoints / poses;
 }
 
 /// Pose by pose, with the moments at which a batch solver looks.
-void run_updates(Feeder& feeder, IncrementalSmoother& smoother, int checkpoints, BackendRun& run) {
+void run_updates(Feeder& feeder, IncrementalSmoother& smoother, BackendRun& run) {
   for (std::size_t k = 0; k < feeder.poses(); ++k) {
     const double begin = tools::thread_time_s();
     feeder.feed(k, smoother);
     const factor_graph::bayes_tree::IncrementalUpdate update = smoother.update();
     run.update_ms.push_back(1e3 * (tools::thread_time_s() - begin));
-    count(run.work, update);
     if (!update.ok && run.error.empty()) run.error = update.error;
-    if (is_checkpoint(k, feeder.poses(), checkpoints)) {
+    if (is_checkpoint(k, feeder.poses())) {
       run.moments.push_back(moment_of(smoother, newest_pose(smoother), static_cast<int>(k) + 1));
     }
   }
@@ -69,9 +57,7 @@ void run_references(const factor_graph::files::GraphFile& graph, IncrementalSmoo
   run.refactorisation_ms = refactorisation_ms(smoother.graph());
 
   factor_graph::graph::FactorGraph copy = copy_of(smoother.graph());
-  const double start = tools::thread_time_s();
   const factor_graph::batch::BatchReport report = solve_whole(copy);
-  run.batch_s = tools::thread_time_s() - start;
   run.chi2_batch = report.chi2;
   if (!report.ok) run.error = "batch: " + report.error;
 
@@ -81,12 +67,11 @@ void run_references(const factor_graph::files::GraphFile& graph, IncrementalSmoo
 
 }  // namespace
 
-BackendRun run_backend(const std::filesystem::path& file, const BackendSettings& settings) {
-  return run_backend(read_graph_file(file), file.stem().string(), settings);
+BackendRun run_backend(const std::filesystem::path& file) {
+  return run_backend(read_graph_file(file), file.stem().string());
 }
 
-BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::string& dataset,
-                       const BackendSettings& settings) {
+BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::string& dataset) {
   BackendRun run;
   run.dataset = dataset;
   run.factors = graph.factors.size();
@@ -95,10 +80,9 @@ BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::s
   run.poses = feeder.poses();
   run.points = graph.vertices.size() - run.poses;
 
-  const auto smoother = std::make_unique<IncrementalSmoother>(settings.smoother);
-  run_updates(feeder, *smoother, settings.checkpoints, run);
+  const auto smoother = std::make_unique<IncrementalSmoother>();
+  run_updates(feeder, *smoother, run);
   run.rss_mb = tools::resident_mb();
-  run.smoother_mb = static_cast<double>(smoother->bytes()) / 1048576.0;
 
   const double begin = tools::thread_time_s();
   smoother->settle();

@@ -12,45 +12,30 @@
 
 namespace understory::eval::experiments::backend {
 
-/// How a graph is run.
-struct BackendSettings {
-  factor_graph::bayes_tree::IncrementalParameters smoother;
-  int checkpoints = 50;  ///< Moments, evenly spaced, at which a batch solver looks.
-};
-
-/// Sums over all updates of a run, beside what is reported per update.
-struct BackendWork {
-  long eliminated = 0, refreshed = 0, relinearised = 0, moved = 0;
-  double flops = 0.0;
-};
-
 /// One graph, fed pose by pose: each with all factors to earlier ones.
 struct BackendRun {
   std::string dataset;
   std::size_t poses = 0, points = 0, factors = 0;
   std::vector<double> update_ms;  ///< Processor time, estimate included; checkpoints are not.
-  BackendWork work;
-  std::vector<Moment> moments;    ///< The last one is the end of the run, before settle().
+  std::vector<Moment> moments;    ///< Some 50, evenly spaced; the last one is the end of the run,
+                                  ///< before settle().
   double settle_ms = 0.0;         ///< After the last pose, until a fresh step changes nothing.
   double whole_ms = 0.0;          ///< One fresh ordering, linearisation and factorisation of all.
   double refactorisation_ms = 0;  ///< CHOLMOD's numerical factorisation of the last graph.
   double chi2_final = 0.0;        ///< After settle().
   double chi2_batch = 0.0;        ///< Levenberg-Marquardt (CHOLMOD) from the final estimates.
-  double batch_s = 0.0;
-  double chi2_odometry = 0.0;          ///< The same from dead reckoning: often another minimum.
+  double chi2_odometry = 0.0;     ///< The same from dead reckoning: often another minimum.
   std::optional<double> chi2_chordal;  ///< The same from the chordal initialisation.
   double rss_mb = 0.0;                 ///< Of the process, at the end of the run.
-  double smoother_mb = 0.0;
   std::string error;
 };
 
 /// Runs the graph of a file (g2o, TORO or iSAM text) through the smoother and batch solvers. Throws
 /// std::runtime_error naming file and line where it is no graph, or not one that its edges hold
 /// together; what fails later is in `error`. Lines that were passed over are counted on stderr.
-BackendRun run_backend(const std::filesystem::path& file, const BackendSettings& settings = {});
+BackendRun run_backend(const std::filesystem::path& file);
 /// The same for a graph in memory (std::runtime_error where its edges do not hold it together);
 /// `dataset` is its name in the table.
-BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::string& dataset,
-                       const BackendSettings& settings = {});
+BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::string& dataset);
 
 }  // namespace understory::eval::experiments::backend

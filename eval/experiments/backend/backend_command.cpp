@@ -27,7 +27,6 @@ namespace {
 struct BackendOptions {
   std::vector<std::string> files;
   int world_poses = 0;
-  BackendSettings settings;
   std::uint64_t seed = 1;
   std::string json;
   bool plots = true;
@@ -46,9 +45,9 @@ std::vector<std::pair<std::string, WorldParameters>> worlds(int poses) {
 }
 
 /// None where the file is refused, which is said: the others go on.
-std::optional<BackendRun> run_file(const std::string& file, const BackendSettings& settings) {
+std::optional<BackendRun> run_file(const std::string& file) {
   try {
-    return run_backend(file, settings);
+    return run_backend(std::filesystem::path(file));
   } catch (const std::exception& error) {
     fmt::print(stderr, "backend: {}\n", terminal::printable(error.what()));
     return std::nullopt;
@@ -65,16 +64,10 @@ void write_results(const BackendOptions& options, const nlohmann::json& rows,
     names.push_back(std::filesystem::path(file).filename().string());
   }
 
-  harness::write_json(out, harness::result_document(
-                               "backend",
-                               {{"files", names},
-                                {"streets", options.world_poses},
-                                {"seed", options.seed},
-                                {"checkpoints", options.settings.checkpoints},
-                                {"relinearise_above", options.settings.smoother.relinearise_above},
-                                {"least_move", options.settings.smoother.least_move},
-                                {"iterate_above", options.settings.smoother.iterate_above}},
-                               rows));
+  harness::write_json(
+      out, harness::result_document(
+               "backend",
+               {{"files", names}, {"streets", options.world_poses}, {"seed", options.seed}}, rows));
   if (options.plots) harness::plot("backend.py", {out, harness::traces_file(out).string()});
 }
 
@@ -102,14 +95,14 @@ void run_experiment(const BackendOptions& options) {
   print_heading();
   std::size_t refused = 0;
   for (const std::string& file : options.files) {
-    if (const auto run = run_file(file, options.settings)) {
+    if (const auto run = run_file(file)) {
       keep(*run);
     } else {
       ++refused;
     }
   }
   for (const auto& [name, parameters] : worlds(options.world_poses)) {
-    keep(run_backend(make_world(parameters, options.seed), name, options.settings));
+    keep(run_backend(make_world(parameters, options.seed), name));
   }
 
   if (!options.json.empty()) write_results(options, rows, traces);
@@ -129,26 +122,6 @@ void add_backend_experiment(CLI::App& eval) {
       .add_option("--streets", options->world_poses,
                   "Simulated street grids of so many poses besides")
       ->check(CLI::Range(2, 1'000'000));
-  command
-      .add_option("--checkpoints", options->settings.checkpoints,
-                  "Moments of each run at which a batch solver looks")
-      ->check(CLI::Range(0, 100'000))
-      ->capture_default_str();
-  auto& limits = options->settings.smoother;
-  command
-      .add_option("--relinearise-above", limits.relinearise_above,
-                  "IncrementalParameters: deviation of a factor from its linearisation [sigma]")
-      ->check(CLI::Range(1e-9, 1e3))
-      ->capture_default_str();
-  command
-      .add_option("--least-move", limits.least_move, "IncrementalParameters: of a variable [sigma]")
-      ->check(CLI::Range(0.0, 1e3))
-      ->capture_default_str();
-  command
-      .add_option("--iterate-above", limits.iterate_above,
-                  "IncrementalParameters: deviation from which an update goes on [sigma]")
-      ->check(CLI::Range(1e-9, 1e3))
-      ->capture_default_str();
   command.add_option("--seed", options->seed, "Of the simulated ones")->capture_default_str();
   command.add_option("--json", options->json, "Result file; times per update and plot beside it");
   command.add_flag("!--no-plots", options->plots, "Write JSON only");

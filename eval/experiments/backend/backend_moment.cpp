@@ -74,7 +74,7 @@ Moment moment_of(factor_graph::bayes_tree::IncrementalSmoother& smoother, Variab
   moment.newest = distance_of(smoother, batch, newest).value_or(Distance{});
   for (const int v : seen) {
     if (const auto distance = distance_of(smoother, batch, VariableId(v))) {
-      moment.seen.push_back(*distance);
+      moment.seen_sigma.push_back(distance->sigma);
     }
   }
   return moment;

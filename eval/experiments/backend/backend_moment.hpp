@@ -18,9 +18,9 @@ struct Moment {
   int poses = 0;
   double chi2 = 0.0;
   double chi2_batch = 0.0;
-  bool is_verified = false;    ///< The batch solver converged.
-  Distance newest;             ///< Of the newest pose.
-  std::vector<Distance> seen;  ///< Of what it shares a factor with.
+  bool is_verified = false;        ///< The batch solver converged.
+  Distance newest;                 ///< Of the newest pose.
+  std::vector<double> seen_sigma;  ///< Distance::sigma of what it shares a factor with.
 };
 
 /// Solves the graph of this moment by Levenberg-Marquardt from the smoother's estimates and

@@ -60,7 +60,6 @@ constexpr double kLeastLoss = 1e-6;
 nlohmann::json summary_of(const std::vector<Moment>& moments) {
   std::vector<double> excess;
   std::vector<double> sigma;
-  std::vector<double> m;
   std::vector<double> newest_m;
   int unverified = 0;
   for (const Moment& moment : moments) {
@@ -68,11 +67,7 @@ nlohmann::json summary_of(const std::vector<Moment>& moments) {
     if (moment.chi2_batch > kLeastLoss) excess.push_back(moment.chi2 / moment.chi2_batch - 1.0);
     newest_m.push_back(moment.newest.m);
     sigma.push_back(moment.newest.sigma);
-    m.push_back(moment.newest.m);
-    for (const Distance& distance : moment.seen) {
-      sigma.push_back(distance.sigma);
-      m.push_back(distance.m);
-    }
+    sigma.insert(sigma.end(), moment.seen_sigma.begin(), moment.seen_sigma.end());
   }
   return {{"count", moments.size()},
           {"unverified", unverified},
@@ -80,20 +75,7 @@ nlohmann::json summary_of(const std::vector<Moment>& moments) {
           {"excess_max", tools::quantile(excess, 1.0)},
           {"sigma_p50", tools::quantile(sigma, 0.5)},
           {"sigma_p99", tools::quantile(sigma, 0.99)},
-          {"sigma_max", tools::quantile(sigma, 1.0)},
-          {"m_p99", tools::quantile(m, 0.99)},
           {"newest_m_max", tools::quantile(newest_m, 1.0)}};
-}
-
-nlohmann::json work_of(const BackendWork& work, std::size_t updates) {
-  const auto mean = [&](double sum) {
-    return sum / static_cast<double>(std::max<std::size_t>(1, updates));
-  };
-  return {{"eliminated", mean(static_cast<double>(work.eliminated))},
-          {"refreshed", mean(static_cast<double>(work.refreshed))},
-          {"relinearised", mean(static_cast<double>(work.relinearised))},
-          {"moved", mean(static_cast<double>(work.moved))},
-          {"mflops", 1e-6 * mean(work.flops)}};
 }
 
 std::string cell(const nlohmann::json& from, const char* key, const char* form = "{:.2f}",
@@ -123,13 +105,10 @@ nlohmann::json row_of(const BackendRun& run) {
                      {"whole_ms", run.whole_ms},
                      {"refactorisation_ms", run.refactorisation_ms},
                      {"moments", summary_of(run.moments)},
-                     {"work", work_of(run.work, run.update_ms.size())},
                      {"chi2_final", run.chi2_final},
                      {"chi2_batch", run.chi2_batch},
-                     {"batch_s", run.batch_s},
                      {"chi2_odometry", run.chi2_odometry},
                      {"rss_mb", run.rss_mb},
-                     {"smoother_mb", run.smoother_mb},
                      {"error", run.error}};
   if (run.chi2_chordal) row["chi2_chordal"] = *run.chi2_chordal;
 
@@ -151,15 +130,7 @@ nlohmann::json row_of(const BackendRun& run) {
 }
 
 nlohmann::json trace_of(const BackendRun& run) {
-  nlohmann::json moments = nlohmann::json::array();
-  for (const Moment& moment : run.moments) {
-    moments.push_back({{"poses", moment.poses},
-                       {"chi2", moment.chi2},
-                       {"chi2_batch", moment.chi2_batch},
-                       {"newest_sigma", moment.newest.sigma},
-                       {"newest_m", moment.newest.m}});
-  }
-  return {{"dataset", run.dataset}, {"update_ms", run.update_ms}, {"moments", moments}};
+  return {{"dataset", run.dataset}, {"update_ms", run.update_ms}};
 }
 
 void print_heading() {

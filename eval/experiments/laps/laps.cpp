@@ -71,18 +71,15 @@ std::vector<bus::Service> mapping_services() {
 /// Sums up what one lap gives; nothing in it grows.
 class LapCounter {
  public:
-  LapCounter(harness::SensorChain& chain, Truth truth, std::optional<geometry::SE2> map_T_world)
-      : chain_(chain), truth_(std::move(truth)), map_T_world_(std::move(map_T_world)) {
+  LapCounter(harness::SensorChain& chain, Truth truth) : chain_(chain), truth_(std::move(truth)) {
     chain.watch<model::SlamPose>("SLAM_POSE", [this](const model::SlamPose& pose) { add(pose); });
     chain.watch<model::MapUpdate>("SLAM_UPDATE", [this](const model::MapUpdate& update) {
       ++(metrics::localised(update) ? lap_.keyframes : lap_.refused);
     });
   }
 
-  /// The first pose's frame; none before it.
-  const std::optional<geometry::SE2>& map_T_world() const { return map_T_world_; }
   /// The sums since the last call.
-  Lap take(int number, double hours) {
+  Lap take(int number, double hours, const RecordedLap& recorded) {
     const auto poses = static_cast<double>(std::max<std::size_t>(lap_.poses, 1));
     lap_.number = number;
     lap_.hours = hours;
@@ -95,7 +92,8 @@ class LapCounter {
     lap_.mapper_largest_ms = tools::quantile(times_ms, 1.0);
     for (const std::string& service : chain_.services()) (void)chain_.take_calls_ms(service);
     times_ms = {};
-    lap_.heap_mib = heap_mib();
+    lap_.heap_mib = heap_mib() - mib_of(recorded);
+    lap_.mapper_state_mib = mib_of(chain_.state_of(kMapper));
 
     squared_m2_ = nees_ = 0.0;
     return std::exchange(lap_, Lap{});
@@ -122,7 +120,7 @@ class LapCounter {
 
   harness::SensorChain& chain_;
   Truth truth_;
-  std::optional<geometry::SE2> map_T_world_;
+  std::optional<geometry::SE2> map_T_world_;  ///< The first pose's frame.
   Lap lap_;
   double squared_m2_ = 0.0;
   double nees_ = 0.0;
@@ -182,50 +180,42 @@ wire::Bytes later(const harness::RawMessage& message, model::Utime by_us, std::u
 
 }  // namespace
 
-void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
-                const std::function<void(const Lap&)>& done) {
-  std::vector<Lap>& laps = progress.laps;
-  if (static_cast<int>(laps.size()) >= options.laps) return;
+std::vector<Lap> drive_laps(const LapsOptions& options, const std::atomic<bool>& stop,
+                            RecordedLap& recorded, const std::function<void(const Lap&)>& done) {
+  std::vector<Lap> laps;
   sim::SensorDrive drive = make_drive(options);
   harness::SensorChain chain(harness::services_of(options.config_dir), options.config_dir,
                              toml_instead(options, false));
-  if (!laps.empty()) chain.load(progress.states);
-  for (std::uint64_t i = 0; i < progress.readings; ++i) drive.skip();
-
-  LapCounter counter(
-      chain, [&](model::Utime utime) { return drive.state_at(utime).world_T_level(); },
-      progress.map_T_world);
-  Recorder recorder(chain, progress.recorded);
+  LapCounter counter(chain,
+                     [&](model::Utime utime) { return drive.state_at(utime).world_T_level(); });
+  Recorder recorder(chain, recorded);
   const auto end_lap = [&](int number, double hours) {
-    laps.push_back(counter.take(number, hours));
-    laps.back().heap_mib -= mib_of(progress.recorded);
-    progress.states = chain.save();
-    laps.back().mapper_state_mib = mib_of(progress.states.at(kMapper));
-    progress.map_T_world = counter.map_T_world();
-    store_progress(options, progress);
+    laps.push_back(counter.take(number, hours, recorded));
     done(laps.back());
   };
 
   std::optional<Eigen::Vector2d> last;
+  std::uint64_t sweep_parts = 0;
+  double driven_m = 0.0;
   double now_s = 0.0;
   while (const auto reading = drive.next()) {
     if (stop) throw terminal::Interrupted();
-    ++progress.readings;
     if (const auto* truth = std::get_if<sim::TruePose>(&*reading)) {
       const Eigen::Vector2d here = truth->state.position_m.head<2>();
-      if (last) progress.driven_m += (here - *last).norm();
+      if (last) driven_m += (here - *last).norm();
       last = here;
       now_s = 1e-6 * static_cast<double>(truth->utime);
     }
     // The last lap but one is whole: none of it is accelerated or braked.
-    const auto lap = static_cast<int>(progress.driven_m / options.length_m);
+    const auto lap = static_cast<int>(driven_m / options.length_m);
     recorder.set_recording(lap == options.laps - 2);
-    for (const harness::RawMessage& message : harness::raw_messages(*reading, progress.sweep_parts))
+    for (const harness::RawMessage& message : harness::raw_messages(*reading, sweep_parts))
       chain.feed(message);
     if (lap > static_cast<int>(laps.size())) end_lap(lap, now_s / 3600.0);
   }
   chain.finish();
   if (static_cast<int>(laps.size()) < options.laps) end_lap(options.laps, now_s / 3600.0);
+  return laps;
 }
 
 void write_lap_map(const LapsOptions& options, const RecordedLap& recorded) {
@@ -248,9 +238,10 @@ void write_lap_map(const LapsOptions& options, const RecordedLap& recorded) {
                             {whole.utime, "understory eval laps", "a recorded lap", "its map"});
 }
 
-void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
-                const std::function<void(const Lap&)>& done) {
-  const std::vector<harness::RawMessage>& messages = progress.recorded.messages;
+std::vector<Lap> repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop,
+                            const RecordedLap& recorded, std::uint64_t& map_changes,
+                            const std::function<void(const Lap&)>& done) {
+  const std::vector<harness::RawMessage>& messages = recorded.messages;
   if (messages.empty()) throw std::runtime_error("three laps or more are needed");
   const model::Utime begin_us = messages.front().utime;
   const model::Utime lap_us = messages.back().utime - begin_us + kScan_us;
@@ -258,41 +249,30 @@ void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progr
   harness::SensorChain chain(mapping_services(), options.config_dir,
                              toml_instead(options, !options.localise_in.empty()));
   chain.watch<model::MapDelta>("MAP_DELTA",
-                               [&](const model::MapDelta& /*delta*/) { ++progress.map_changes; });
-  if (progress.stretches.empty()) {
-    progress.readings = 0;
-    progress.map_T_world.reset();
-  } else {
-    chain.load(progress.states);
-  }
+                               [&](const model::MapDelta& /*delta*/) { ++map_changes; });
 
-  LapCounter counter(
-      chain,
-      [&](model::Utime utime) {
-        return drive.state_at(begin_us + (utime - begin_us) % lap_us).world_T_level();
-      },
-      progress.map_T_world);
+  LapCounter counter(chain, [&](model::Utime utime) {
+    return drive.state_at(begin_us + (utime - begin_us) % lap_us).world_T_level();
+  });
+  std::vector<Lap> stretches;
+  std::uint64_t repeated = 0;
   const auto hours_of = [&](std::uint64_t laps) {
     return static_cast<double>(laps) * static_cast<double>(lap_us) / 3.6e9;
   };
-  while (hours_of(progress.readings) < options.hours) {
+  while (hours_of(repeated) < options.hours) {
     if (stop) throw terminal::Interrupted();
-    const model::Utime shift_us = static_cast<model::Utime>(progress.readings) * lap_us;
-    std::uint64_t sequence = progress.readings * messages.size();
+    const model::Utime shift_us = static_cast<model::Utime>(repeated) * lap_us;
+    std::uint64_t sequence = repeated * messages.size();
     for (const harness::RawMessage& message : messages)
       chain.feed(message.channel, later(message, shift_us, sequence++));
 
-    const double hours = hours_of(++progress.readings);
-    const auto rows = static_cast<int>(progress.stretches.size());
+    const double hours = hours_of(++repeated);
+    const auto rows = static_cast<int>(stretches.size());
     if (hours < kStretch_h * (rows + 1) && hours < options.hours) continue;
-    progress.stretches.push_back(counter.take(rows + 1, hours));
-    progress.stretches.back().heap_mib -= mib_of(progress.recorded);
-    progress.states = chain.save();
-    progress.stretches.back().mapper_state_mib = mib_of(progress.states.at(kMapper));
-    progress.map_T_world = counter.map_T_world();
-    store_progress(options, progress);
-    done(progress.stretches.back());
+    stretches.push_back(counter.take(rows + 1, hours, recorded));
+    done(stretches.back());
   }
+  return stretches;
 }
 
 }  // namespace understory::eval::experiments::laps

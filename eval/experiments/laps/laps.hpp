@@ -6,8 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,8 +24,7 @@ struct LapsOptions {
   /// The map of the recorded lap is written to this file, and in the hours nothing but localising
   /// in it is done; empty: the hours map from nothing.
   std::filesystem::path localise_in;
-  double known_ground_m = -1.0;    ///< Instead of the mapper's parameter; negative: as configured.
-  std::filesystem::path progress;  ///< File from which an interrupted run goes on; empty: none.
+  double known_ground_m = -1.0;  ///< Instead of the mapper's parameter; negative: as configured.
   std::string json;
   bool plots = true;
 };
@@ -54,38 +51,20 @@ struct RecordedLap {
   std::vector<harness::RawMessage> messages;  ///< In order of arrival.
 };
 
-/// How far a run has come: all that it needs to go on.
-struct Progress {
-  std::vector<Lap> laps;
-  std::vector<Lap> stretches;
-  RecordedLap recorded;
-  std::map<std::string, std::string> states;  ///< Of the services, after the last row.
-  std::optional<geometry::SE2> map_T_world;   ///< Likewise.
-  std::uint64_t readings = 0;                 ///< Of the drive; in the hours laps of the record.
-  std::uint64_t sweep_parts = 0;
-  double driven_m = 0.0;
-  std::uint64_t map_changes = 0;  ///< MAP_DELTA in the hours, of this process.
-};
-
-/// The progress of a run with these options, empty where there is no file. Throws
-/// std::runtime_error naming the file where it is of another run.
-Progress load_progress(const LapsOptions& options);
-/// Writes it, where the options name a file.
-void store_progress(const LapsOptions& options, const Progress& progress);
-
-/// Drives the laps from raw LIDAR, or those that are missing. The last lap but one is recorded.
-/// `done` is called after each lap.
-void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
-                const std::function<void(const Lap&)>& done);
+/// Drives the laps from raw LIDAR. The last lap but one is recorded. `done` is called after each
+/// lap.
+std::vector<Lap> drive_laps(const LapsOptions& options, const std::atomic<bool>& stop,
+                            RecordedLap& recorded, const std::function<void(const Lap&)>& done);
 
 /// Makes the map of the recorded lap and writes it to `options.localise_in`, unless it is there.
 /// Throws std::runtime_error where a lap gives no map, map_file::MapFileError.
 void write_lap_map(const LapsOptions& options, const RecordedLap& recorded);
 
 /// Repeats what was recorded for `options.hours` through keyframer and mapper, from an empty map or
-/// in the one of `options.localise_in`. A row for each half hour.
-void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
-                const std::function<void(const Lap&)>& done);
+/// in the one of `options.localise_in`. A row for each half hour. `map_changes`: counts MAP_DELTA.
+std::vector<Lap> repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop,
+                            const RecordedLap& recorded, std::uint64_t& map_changes,
+                            const std::function<void(const Lap&)>& done);
 
 /// Adds `laps`.
 void add_laps_experiment(CLI::App& eval);

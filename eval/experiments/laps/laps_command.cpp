@@ -81,27 +81,24 @@ std::string map_bytes(const LapsOptions& options) {
 
 void run(const LapsOptions& options) {
   const auto& stop = terminal::catch_interrupts();
-  Progress progress = load_progress(options);
-  const std::vector<Lap>& laps = progress.laps;
-  const std::vector<Lap>& stretches = progress.stretches;
-
+  RecordedLap recorded;
   print_header("lap");
-  for (const Lap& lap : laps) print_row(lap);
-  drive_laps(options, stop, progress, print_row);
+  const std::vector<Lap> laps = drive_laps(options, stop, recorded, print_row);
   fmt::print("slope of the last half: {:.2f} MiB/h\n", slope_mib_per_h(laps));
 
   bool is_map_as_it_was = false;
+  std::vector<Lap> stretches;
   if (options.hours > 0.0) {
-    if (!options.localise_in.empty()) write_lap_map(options, progress.recorded);
+    if (!options.localise_in.empty()) write_lap_map(options, recorded);
     const std::string map = map_bytes(options);
     print_header("half hour");
-    for (const Lap& stretch : stretches) print_row(stretch);
-    repeat_lap(options, stop, progress, print_row);
+    std::uint64_t map_changes = 0;
+    stretches = repeat_lap(options, stop, recorded, map_changes, print_row);
     fmt::print("slope of the last half: {:.2f} MiB/h\n", slope_mib_per_h(stretches));
-    is_map_as_it_was = map == map_bytes(options) && progress.map_changes == 0;
+    is_map_as_it_was = map == map_bytes(options) && map_changes == 0;
     if (!options.localise_in.empty())
       fmt::print("{}: {}, {} changes told\n", options.localise_in.string(),
-                 is_map_as_it_was ? "the same bytes" : "CHANGED", progress.map_changes);
+                 is_map_as_it_was ? "the same bytes" : "CHANGED", map_changes);
   }
   if (options.json.empty()) return;
 
@@ -150,8 +147,6 @@ void add_laps_experiment(CLI::App& eval) {
                       "Instead of smoothing.known_ground_m; 0: every keyframe is kept");
   command->add_option("--seed", options->seed, "Seed of everything")->capture_default_str();
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
-  command->add_option("--progress", options->progress,
-                      "File that keeps how far the run is: the same command goes on from there");
   command->add_option("--json", options->json, "Result file; a plot goes beside it");
   command->add_flag("!--no-plots", options->plots, "No plot");
   command->callback([options] { run_guarded("laps", [options] { run(*options); }); });
