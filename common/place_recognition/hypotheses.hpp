@@ -41,8 +41,6 @@ class TripletIndex {
   std::vector<Hypothesis> hypotheses(std::span<const LevelStem> stems,
                                      std::span<const StemTriangle> triangles,
                                      const HypothesisFilter& filter) const;
-  /// Memory held [bytes].
-  std::size_t bytes() const { return triangles_.bytes() + stems_.capacity() * sizeof(IndexedStem); }
 
  private:
   struct IndexedStem {

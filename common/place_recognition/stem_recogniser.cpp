@@ -78,7 +78,6 @@ class StemRecogniser::Index {
     for (std::size_t i = 0; i < ids_.size(); ++i) bytes += chains_.stems(i).bytes();
     return bytes;
   }
-  std::size_t index_bytes() const { return triangles_.bytes(); }
 
  private:
   /// What is asked for: frames before the index `end`.
@@ -273,6 +272,5 @@ PlaceAnswer StemRecogniser::query(std::span<const LevelStem> stems, FrameId newe
 }
 std::size_t StemRecogniser::size() const { return index_->size(); }
 std::size_t StemRecogniser::stored_bytes() const { return index_->stored_bytes(); }
-std::size_t StemRecogniser::index_bytes() const { return index_->index_bytes(); }
 
 }  // namespace understory::place_recognition

@@ -83,8 +83,6 @@ class StemRecogniser {
   std::size_t size() const;
   /// What has to be kept of all frames [bytes]: the index follows from it.
   std::size_t stored_bytes() const;
-  /// The index in memory [bytes].
-  std::size_t index_bytes() const;
 
  private:
   class Index;

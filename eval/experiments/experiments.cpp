@@ -13,13 +13,9 @@ namespace {
 
 void add_options(CLI::App& command, harness::CampaignOptions& options,
                  const std::vector<std::string>& methods) {
-  command.add_option("--runs", options.runs, "Runs per cell")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  add_number(command, "--runs", options.runs, 1, 100000, "Runs per cell");
   command.add_option("--seed", options.seed, "Seed of all randomness")->capture_default_str();
-  command.add_option("--jobs", options.jobs, "Runs side by side")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  add_number(command, "--jobs", options.jobs, 1, 1024, "Runs side by side");
   command.add_option("--json", options.json, "Result file; traces and plots go beside it");
   command
       .add_option("--method", options.methods,

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <CLI/Validators.hpp>
 #include <functional>
+#include <string>
+#include <type_traits>
 
 #include "eval/harness/campaign.hpp"
 
@@ -12,6 +15,16 @@ namespace understory::eval::experiments {
 void add_campaign_options(CLI::App& command, harness::CampaignOptions& options);
 /// The same with the method "lidar", and --config for it.
 void add_campaign_options_with_lidar(CLI::App& command, harness::CampaignOptions& options);
+
+/// An option that takes a number from `least` to `most`; --help shows its default.
+template <class T>
+CLI::Option* add_number(CLI::App& command, const std::string& name, T& value,
+                        std::type_identity_t<T> least, std::type_identity_t<T> most,
+                        const std::string& text) {
+  return command.add_option(name, value, text)
+      ->check(CLI::Range(least, most))
+      ->capture_default_str();
+}
 
 /// Runs `work` and turns what it throws into one line on stderr and exit status 1.
 void run_guarded(const std::string& experiment, const std::function<void()>& work);

@@ -148,7 +148,7 @@ TEST_CASE("delays are apart, and of every kind", "[reliability]") {
   for (std::size_t i = 0; i < faults.size(); ++i) {
     ++kinds[faults[i].what];
     CHECK(faults[i].to_s - faults[i].from_s <= plan.longest_s);
-    if (i > 0) CHECK(faults[i].from_s - faults[i - 1].to_s == Approx(plan.apart_s));
+    if (i > 0) CHECK(faults[i].from_s - faults[i - 1].to_s == Approx(kApart_s));
   }
   CHECK(kinds.size() == 7);
   plan.only = "ekf";

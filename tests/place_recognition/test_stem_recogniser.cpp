@@ -135,5 +135,4 @@ TEST_CASE("Likelier candidates come first, and what is kept is six bytes a stem"
                            static_cast<double>(mapped.poses.size());
   CHECK(per_frame > 6.0 * 15);
   CHECK(per_frame < 6.0 * 30);
-  CHECK(mapped.recogniser.index_bytes() > mapped.recogniser.stored_bytes());
 }

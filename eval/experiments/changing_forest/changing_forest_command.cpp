@@ -195,22 +195,15 @@ void add_changing_forest_experiment(CLI::App& eval) {
   command.add_option("--part", options->part, "What happens: one part, or all")
       ->check(CLI::IsMember({"all", "changes", "stack", "false detections"}))
       ->capture_default_str();
-  command.add_option("--runs", options->runs, "Forests, each driven in every way")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_number(command, "--runs", options->runs, 1, 1000, "Forests, each driven in every way");
   command.add_option("--seed", options->seed, "Seed of the first forest")->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Runs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
-  command.add_option("--drives", options->drives.forest.drives, "Drives; the first one maps")
-      ->check(CLI::Range(2, 100))
-      ->capture_default_str();
-  command.add_option("--share", options->drives.forest.share, "Of the trees felled between two")
-      ->check(CLI::Range(0.0, 0.9))
-      ->capture_default_str();
-  command.add_option("--length-m", options->drives.forest.course.length_m, "Of the path [m]")
-      ->check(CLI::Range(30.0, 10000.0))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
+  add_number(command, "--drives", options->drives.forest.drives, 2, 100,
+             "Drives; the first one maps");
+  add_number(command, "--share", options->drives.forest.share, 0.0, 0.9,
+             "Of the trees felled between two");
+  add_number(command, "--length-m", options->drives.forest.course.length_m, 30.0, 10000.0,
+             "Of the path [m]");
   command.add_option("--config", options->drives.config_dir, "Configuration folder of the chain")
       ->capture_default_str();
   command.add_option("--json", options->json, "Result document");

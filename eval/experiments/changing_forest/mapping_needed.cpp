@@ -170,16 +170,11 @@ void add_mapping_needed_experiment(CLI::App& eval) {
       ->delimiter(',')
       ->check(CLI::Range(0.01, 0.9))
       ->capture_default_str();
-  command.add_option("--runs", options->runs, "Forests, each with every change")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_number(command, "--runs", options->runs, 1, 1000, "Forests, each with every change");
   command.add_option("--seed", options->seed, "Seed of the first forest")->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Runs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
-  command.add_option("--length-m", options->drives.forest.course.length_m, "Of the path [m]")
-      ->check(CLI::Range(30.0, 10000.0))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
+  add_number(command, "--length-m", options->drives.forest.course.length_m, 30.0, 10000.0,
+             "Of the path [m]");
   command.add_option("--config", options->drives.config_dir, "Configuration folder of the chain")
       ->capture_default_str();
   command.add_option("--json", options->json, "Result document");

@@ -239,16 +239,11 @@ void add_closures_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand(
       "closures", "Right and wrong loop closures, and which of them known ways let count");
   const auto options = std::make_shared<ClosuresOptions>();
-  command.add_option("--runs", options->runs, "Drives of each sort")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command.add_option("--plantations", options->plantations, "Drives in rows, of each regularity")
-      ->check(CLI::Range(0, 1000))
-      ->capture_default_str();
+  add_number(command, "--runs", options->runs, 1, 100000, "Drives of each sort");
+  add_number(command, "--plantations", options->plantations, 0, 1000,
+             "Drives in rows, of each regularity");
   command.add_option("--seed", options->seed, "The others follow it")->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Drives side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command.add_option("--json", options->json, "Result document");
   command.callback([options] { run_guarded("closures", [options] { run(*options); }); });
 }

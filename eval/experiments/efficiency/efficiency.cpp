@@ -215,17 +215,12 @@ void add_efficiency_experiment(CLI::App& eval) {
       "efficiency", "Time per keyframe: 200 m, a long drive, stationary (one run, one job)");
   const auto options = std::make_shared<EfficiencyOptions>();
   add_campaign_options(command, options->campaign);
-  command.add_option("--drive-km", options->drive_km, "Length of the long drive; 0 = none")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  command.add_option("--stationary-h", options->stationary_h, "Hours stationary; 0 = none")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  command
-      .add_option("--hand-over-m", options->hand_over_m,
-                  "What is farther from the vehicle goes to the disk [m]; 0 = nothing")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
+  add_number(command, "--drive-km", options->drive_km, 0.0, 1000.0,
+             "Length of the long drive; 0 = none");
+  add_number(command, "--stationary-h", options->stationary_h, 0.0, 1000.0,
+             "Hours stationary; 0 = none");
+  add_number(command, "--hand-over-m", options->hand_over_m, 0.0, 1e6,
+             "What is farther from the vehicle goes to the disk [m]; 0 = nothing");
   command.callback([options] { run_guarded("efficiency", [&] { run_efficiency(*options); }); });
 }
 

@@ -84,15 +84,11 @@ void add_existence_experiment(CLI::App& eval) {
       "existence",
       "Which points of an old map still exist: changed worlds, occluders, a real forest");
   const auto options = std::make_shared<ExistenceOptions>();
-  command.add_option("--runs", options->runs, "Worlds per setting")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
+  add_number(command, "--runs", options->runs, 1, 10000, "Worlds per setting");
   command
       .add_option("--seed", options->seed, "Seed of the first world; tuned on 100001 and 100002")
       ->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Jobs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Jobs side by side");
   command.add_option("--only", options->only, "Some of the parts")->check(CLI::IsMember(kParts));
   command.add_option("--data", options->data,
                      "Folder with stem_censuses and tree_existence; default $UNDERSTORY_DATA");

@@ -57,9 +57,7 @@ nlohmann::json measures_of(const AfterDrive& after) {
           {"gone_removed_pct", 100.0 * removed_share(after.scored, false)},
           {"hidden_points", after.hidden.size()},
           {"hidden_removed_pct", 100.0 * removed_share(after.hidden, true)},
-          {"rest_points", after.rest.size()},
-          {"rest_auc", roc_area(after.rest)},
-          {"rest_brier", brier_score(after.rest)}};
+          {"rest_auc", roc_area(after.rest)}};
 }
 
 nlohmann::json curves_of(const AfterDrive& after) {

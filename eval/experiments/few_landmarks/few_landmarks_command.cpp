@@ -122,37 +122,22 @@ void add_few_landmarks_experiment(CLI::App& eval) {
       "few-landmarks",
       "A car park with two or three landmarks in a scan, wheels and a one-plane laser");
   const auto options = std::make_shared<FewLandmarksOptions>();
-  command.add_option("--seeds", options->seeds, "Drives")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_number(command, "--seeds", options->seeds, 1, 1000, "Drives");
   command.add_option("--first-seed", options->first_seed, "The others follow it")
       ->capture_default_str();
 
   FewLandmarksDrive& plan = options->drive;
-  command.add_option("--spacing-m", plan.spacing_m, "Between neighbouring trunks [m]")
-      ->check(CLI::Range(3.0, 100.0))
-      ->capture_default_str();
-  command.add_option("--length-m", plan.length_m, "Of the circle [m]")
-      ->check(CLI::Range(50.0, 10000.0))
-      ->capture_default_str();
-  command.add_option("--laps", plan.laps, "Rounds")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  command.add_option("--walkers", plan.walkers, "People beside the path")
-      ->check(CLI::Range(0, 1000))
-      ->capture_default_str();
-  command
-      .add_option("--wheel-scale", plan.wheel_scale,
-                  "Errors of wheels and steering, by the simulation's usual ones")
-      ->check(CLI::Range(0.0, 20.0))
-      ->capture_default_str();
+  add_number(command, "--spacing-m", plan.spacing_m, 3.0, 100.0, "Between neighbouring trunks [m]");
+  add_number(command, "--length-m", plan.length_m, 50.0, 10000.0, "Of the circle [m]");
+  add_number(command, "--laps", plan.laps, 1, 100, "Rounds");
+  add_number(command, "--walkers", plan.walkers, 0, 1000, "People beside the path");
+  add_number(command, "--wheel-scale", plan.wheel_scale, 0.0, 20.0,
+             "Errors of wheels and steering, by the simulation's usual ones");
 
   command.add_option("--config", plan.config_dir, "Configuration of the chain's services")
       ->capture_default_str();
   command.add_option("--logs", options->logs, "Folder for the readings of each drive, as logs");
-  command.add_option("--jobs", options->jobs, "Drives side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command.add_option("--json", options->json, "Result document");
   command.callback([options] { run_guarded("few-landmarks", [options] { run(*options); }); });
 }

@@ -124,8 +124,7 @@ void run(const FrontendOptions& options) {
   std::cout << to_table(rows.rows());
   if (options.json.empty()) return;
 
-  const nlohmann::json config = {
-      {"seed", options.seed}, {"runs", options.runs}, {"drive_m", options.drive_m}};
+  const nlohmann::json config = {{"seed", options.seed}, {"runs", options.runs}};
   harness::write_json(options.json,
                       harness::result_document("frontend", config, to_json(rows.rows())));
   harness::write_json(harness::traces_file(options.json), traces);
@@ -150,12 +149,10 @@ void add_frontend_experiment(CLI::App& eval) {
   auto options = std::make_shared<FrontendOptions>();
   options->config_dir = "deploy/config/lidar";
 
-  command->add_option("--runs", options->runs, "Runs of the filter; others follow from it")
-      ->check(CLI::Range(1, 100000));
+  add_number(*command, "--runs", options->runs, 1, 100000,
+             "Runs of the filter; others follow from it");
   command->add_option("--seed", options->seed, "Seed of everything");
-  command->add_option("--jobs", options->jobs, "Drives side by side")->check(CLI::Range(1, 256));
-  command->add_option("--drive-m", options->drive_m, "Length of the forest drive [m]")
-      ->check(CLI::Range(50.0, 100000.0));
+  add_number(*command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
 
   const char* const data = std::getenv("UNDERSTORY_DATA");  // NOLINT(concurrency-mt-unsafe)

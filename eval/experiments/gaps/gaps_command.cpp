@@ -98,14 +98,10 @@ void add_gaps_experiment(CLI::App& eval) {
       "gaps",
       "A process that hangs or a sensor that is silent for 1.1 to 30 s: the poses after it");
   const auto options = std::make_shared<GapsOptions>();
-  command.add_option("--seeds", options->seeds, "Drives of each gap")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_number(command, "--seeds", options->seeds, 1, 1000, "Drives of each gap");
   command.add_option("--first-seed", options->first_seed, "The others follow it")
       ->capture_default_str();
-  command.add_option("--length-m", options->drive.length_m, "Of a drive [m]")
-      ->check(CLI::Range(250.0, 100000.0))
-      ->capture_default_str();
+  add_number(command, "--length-m", options->drive.length_m, 250.0, 100000.0, "Of a drive [m]");
 
   command.add_option("--lidar", options->lidar, "vlp32 or vlp16")
       ->check(CLI::IsMember({"vlp32", "vlp16"}))
@@ -115,9 +111,7 @@ void add_gaps_experiment(CLI::App& eval) {
       .add_option("--config", options->drive.config_dir, "Configuration of the chain's services")
       ->capture_default_str();
 
-  command.add_option("--jobs", options->jobs, "Drives side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command.add_option("--json", options->json, "Result document");
 
   command.callback([options] { run_guarded("gaps", [options] { run(*options); }); });

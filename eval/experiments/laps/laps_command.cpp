@@ -126,20 +126,14 @@ void add_laps_experiment(CLI::App& eval) {
       "laps",
       "The same way again and again, from raw LIDAR: memory, latency, accuracy, lap by lap");
   auto options = std::make_shared<LapsOptions>();
-  command->add_option("--laps", options->laps, "Laps from raw LIDAR")
-      ->check(CLI::Range(2, 100000))
-      ->capture_default_str();
-  command->add_option("--length-m", options->length_m, "Length of a lap [m]")
-      ->check(CLI::Range(100.0, 100000.0))
-      ->capture_default_str();
+  add_number(*command, "--laps", options->laps, 2, 100000, "Laps from raw LIDAR");
+  add_number(*command, "--length-m", options->length_m, 100.0, 100000.0, "Length of a lap [m]");
   command->add_option("--beams", options->beams, "Of the LIDAR")
       ->check(CLI::IsMember({16, 32}))
       ->capture_default_str();
-  command
-      ->add_option("--hours", options->hours,
-                   "Then so many hours of keyframer and mapper alone, from an empty map, with "
-                   "the LANDMARKS and ODOMETRY of the last lap but one again and again")
-      ->check(CLI::Range(0.0, 10000.0));
+  add_number(*command, "--hours", options->hours, 0.0, 10000.0,
+             "Then so many hours of keyframer and mapper alone, from an empty map, with the "
+             "LANDMARKS and ODOMETRY of the last lap but one again and again");
   command->add_option("--localise-in", options->localise_in,
                       "A map file: the map of the recorded lap is written to it, where it is not "
                       "there, and the hours are localisation only in it");

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -13,18 +12,12 @@
 
 namespace understory::eval::experiments::large_map {
 
-/// Where a keyframe was found.
-struct PlaceAnswer {
-  std::optional<geometry::SE2> map_T_base;  ///< None: not sure.
-  std::string reason;                       ///< Why not, where not.
-};
-
 /// Finds the pose of a keyframe's base in a given map, with no prior and no memory of earlier ones.
 class PlaceFinder {
  public:
   virtual ~PlaceFinder() = default;
-  /// The pose of the base, or why there is none.
-  virtual PlaceAnswer find(const model::Keyframe& keyframe) const = 0;
+  /// map_T_base; none where it is not sure.
+  virtual std::optional<geometry::SE2> find(const model::Keyframe& keyframe) const = 0;
   /// Memory that the map takes for each landmark [bytes]; 0 = not known.
   virtual double bytes_per_landmark() const { return 0.0; }  ///< 0 = not known.
 };

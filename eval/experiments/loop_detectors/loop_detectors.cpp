@@ -115,14 +115,11 @@ nlohmann::json row_of(const NamedSet& set, const Answers& answers, double thresh
                      {"recall_accepted", score.recall_accepted},
                      {"wrong_accepted", score.wrong_accepted},
                      {"wrong_poses_accepted", score.wrong_poses_accepted},
-                     {"right_poses", error_m.size()},
                      {"error_m_p50", tools::quantile(error_m, 0.5)},
                      {"ms_p50", tools::quantile(ms, 0.5)},
                      {"ms_p99", tools::quantile(ms, 0.99)},
                      {"bytes_per_frame", answers.bytes_per_frame}};
   if (std::isfinite(threshold)) row["threshold"] = threshold;
-  const double highest_wrong = highest_wrong_score(answers.answers);
-  if (std::isfinite(highest_wrong)) row["highest_wrong_score"] = highest_wrong;
   if (score.queries_without_match > 0)
     row["wrong_bound_95_pct"] = 300.0 / static_cast<double>(score.queries_without_match);
   return row;
@@ -268,27 +265,17 @@ void add_loop_detectors_experiment(CLI::App& eval) {
       ->capture_default_str();
   command.add_flag(
       "--detectors-only", [options](std::int64_t) { options->verifiers.clear(); }, "No verifier");
-  command.add_option("--queries", options->trial.most_queries, "Of a set, at most")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command
-      .add_option("--cloud-queries", options->trial.most_cloud_queries,
-                  "The same of a set with clouds of points")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command.add_option("--drives", options->drives, "Drives through each stem map, by seed")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_number(command, "--queries", options->trial.most_queries, 1, 100000, "Of a set, at most");
+  add_number(command, "--cloud-queries", options->trial.most_cloud_queries, 1, 100000,
+             "The same of a set with clouds of points");
+  add_number(command, "--drives", options->drives, 1, 1000,
+             "Drives through each stem map, by seed");
   command.add_option("--threshold", options->threshold,
                      "Scores above it are accepted, whatever the tuning sets say");
-  command
-      .add_option("--candidates", options->trial.candidates,
-                  "Of a detector, that a verifier compares")
-      ->check(CLI::Range(1, 50))
-      ->capture_default_str();
-  command.add_option("--length-m", options->set.length_m, "Of simulated ways [m]")
-      ->check(CLI::Range(200.0, 100000.0))
-      ->capture_default_str();
+  add_number(command, "--candidates", options->trial.candidates, 1, 50,
+             "Of a detector, that a verifier compares");
+  add_number(command, "--length-m", options->set.length_m, 200.0, 100000.0,
+             "Of simulated ways [m]");
   command
       .add_option("--cloud-points", options->set.cloud_points,
                   "Most of a simulated sweep's cloud: place_scan.most_points")
@@ -296,9 +283,7 @@ void add_loop_detectors_experiment(CLI::App& eval) {
       ->capture_default_str();
   command.add_option("--seed", options->set.seed, "Of worlds, ways and detections")
       ->capture_default_str();
-  command.add_option("--jobs", options->trial.jobs, "Queries side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->trial.jobs, 1, 256, "Queries side by side");
   command.add_option("--data", options->data,
                      "Folder of recordings; default $UNDERSTORY_DATA, else ../shared/data");
   command.add_option("--json", options->json, "Result document; the plots go beside it");

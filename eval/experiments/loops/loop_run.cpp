@@ -71,35 +71,27 @@ class ClosureScore {
     const double squared = off.dot(closure.from_T_to.covariance.llt().solve(off));
     const double off_m = off.head<2>().norm();
     const bool is_wrong = off_m > kWrongM && squared > kWrongSigmas * kWrongSigmas;
-    sent_[closure.id] = {along_m_[to], is_wrong};
+    is_wrong_[closure.id] = is_wrong;
     ++score.sent;
     if (is_wrong) ++score.sent_wrong;
     score.mean_nees += squared;
-    score.largest_off_m = std::max(score.largest_off_m, off_m);
   }
 
-  void accept(std::uint64_t id, LoopScore& score) {
-    if (score.first_accepted_m < 0.0) score.first_accepted_m = sent_.at(id).along_m;
-    accepted_.insert(id);
-  }
+  void accept(std::uint64_t id) { accepted_.insert(id); }
 
   void sum_up(const loop_closer::LoopCloser& closer, LoopScore& score) const {
     if (score.sent > 0) score.mean_nees /= static_cast<double>(score.sent);
     score.accepted = accepted_.size();
-    for (const std::uint64_t id : accepted_) score.accepted_wrong += sent_.at(id).is_wrong;
+    for (const std::uint64_t id : accepted_) score.accepted_wrong += is_wrong_.at(id);
     score.search_ms_p50 = tools::quantile(search_ms_, 0.5);
     score.search_ms_p99 = tools::quantile(search_ms_, 0.99);
     score.unexpected = closer.counters().unexpected;
   }
 
  private:
-  struct Sent {
-    double along_m = 0.0;
-    bool is_wrong = false;
-  };
   const LoopDrive& drive_;
   std::vector<double> along_m_;
-  std::map<std::uint64_t, Sent> sent_;
+  std::map<std::uint64_t, bool> is_wrong_;  ///< Of those that were sent.
   std::set<std::uint64_t> accepted_;
   std::vector<double> search_ms_;
 };
@@ -181,11 +173,7 @@ class LoopRun {
       score_.first_frame = frame;
       map_T_first_ = update.map_T_vehicle * drive_.truth[frame].inverse();
     }
-    if (update.status == kFirstMap || update.status == kUpdated) {
-      ++score_.placed;
-      const geometry::SE2 truth = map_T_first_ * drive_.truth[frame];
-      score_.online_m = (update.map_T_vehicle.translation() - truth.translation()).norm();
-    }
+    if (update.status == kFirstMap || update.status == kUpdated) ++score_.placed;
     if (!closer_) return;
     const double start_s = tools::thread_time_s();
     if (auto closure = ask(update, frame, *closer_, scores_, score_))
@@ -199,7 +187,7 @@ class LoopRun {
     using enum model::LoopResult::Status;
     if (result.status == kRefused) ++score_.refused;
     if (result.status == kWaiting) ++score_.waiting;
-    if (result.status == kAccepted) scores_.accept(result.closure_id, score_);
+    if (result.status == kAccepted) scores_.accept(result.closure_id);
   }
 
   /// What was found leaves after the scan that showed it, as on a bus.
@@ -232,7 +220,6 @@ class LoopRun {
     const PathErrors errors = path_errors(drive_, frames, poses);
     score_.error_m = errors.mean_m;
     score_.ate_m = errors.ate_m;
-    score_.end_m = errors.end_m;
     score_.fate = fate_.sum_up(*last_map_, map_T_first_);
   }
 
@@ -278,8 +265,7 @@ PathErrors path_errors(const LoopDrive& drive, const std::vector<std::size_t>& f
   for (std::size_t i = 0; i < frames.size(); ++i) {
     truth_m.emplace_back(drive.truth[frames[i]].translation());
     path_m.emplace_back(poses[i].translation());
-    errors.end_m = (truth_m.back() - path_m.back()).norm();
-    errors.mean_m += errors.end_m;
+    errors.mean_m += (truth_m.back() - path_m.back()).norm();
   }
   errors.mean_m /= static_cast<double>(frames.size());
 

@@ -18,8 +18,6 @@ struct LoopScore {
   std::size_t maps = 0;    ///< That it began.
   double error_m = 0.0;    ///< Mean of all keyframes in the final map, first pose held.
   double ate_m = 0.0;      ///< Root mean square of the same after one rigid alignment.
-  double end_m = 0.0;      ///< Of the last keyframe.
-  double online_m = 0.0;   ///< Of the last keyframe as it was told.
   std::size_t in_map = 0;  ///< Keyframes that the final map holds.
   // Of the loop closer; 0 without it.
   std::size_t queries = 0;
@@ -33,8 +31,6 @@ struct LoopScore {
   std::size_t waiting = 0;
   std::size_t refused = 0;
   double mean_nees = 0.0;  ///< Of the relative poses sent; 3 is exact.
-  double largest_off_m = 0.0;
-  double first_accepted_m = -1.0;  ///< Path at the first accepted one.
   double search_ms_p50 = 0.0;
   double search_ms_p99 = 0.0;
   double mapper_ms_p99 = 0.0;
@@ -51,12 +47,10 @@ LoopScore run_drive(const LoopDrive& drive, const std::filesystem::path& config_
 /// again: many queries in short time. Nothing is accepted.
 LoopScore reckon_drive(const LoopDrive& drive, const std::filesystem::path& config_dir);
 
-/// Mean error [m], error after alignment [m] and error of the last one of poses that are given for
-/// some frames.
+/// Mean error [m] and error after alignment [m] of poses that are given for some frames.
 struct PathErrors {
   double mean_m = 0.0;
   double ate_m = 0.0;
-  double end_m = 0.0;
 };
 /// `frames`: which of the drive's frames the poses are of.
 PathErrors path_errors(const LoopDrive& drive, const std::vector<std::size_t>& frames,

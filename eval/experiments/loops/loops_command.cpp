@@ -30,8 +30,6 @@ struct LoopsOptions {
   int runs = 1;
   std::uint64_t seed = 1;
   int jobs = 1;
-  bool batch = true;
-  bool without = true;
   bool reckon = false;
   std::string json;
 };
@@ -57,8 +55,6 @@ nlohmann::json row_of(const LoopDrive& drive, std::uint64_t seed, const LoopScor
           {"in_map", score.in_map},
           {"error_m", score.error_m},
           {"ate_m", score.ate_m},
-          {"end_m", score.end_m},
-          {"online_end_m", score.online_m},
           {"queries", score.queries},
           {"queries_with_match", score.with_match},
           {"queries_without_match", score.without_match},
@@ -69,8 +65,6 @@ nlohmann::json row_of(const LoopDrive& drive, std::uint64_t seed, const LoopScor
           {"wrong_accepted", score.accepted_wrong},
           {"waiting", score.waiting},
           {"refused", score.refused},
-          {"first_accepted_m", score.first_accepted_m},
-          {"largest_off_m", score.largest_off_m},
           {"mean_nees", score.mean_nees},
           {"search_ms_p50", score.search_ms_p50},
           {"search_ms_p99", score.search_ms_p99},
@@ -85,22 +79,13 @@ nlohmann::json solve(const std::string& name, const std::vector<model::StemFrame
   if (options.reckon) return row_of(drive, seed, reckon_drive(drive, options.config));
   const LoopScore score = run_drive(drive, options.config, true);
   nlohmann::json row = row_of(drive, seed, score);
-  if (options.without) {
-    const LoopScore without = run_drive(drive, options.config, false);
-    row["error_without_m"] = without.error_m;
-    row["ate_without_m"] = without.ate_m;
-    row["end_without_m"] = without.end_m;
-    row["maps_without"] = without.maps;
-  }
-  if (options.batch) {
-    const PathErrors batch = batch_errors(drive, score.first_frame, Association::kTrue);
-    row["error_batch_m"] = batch.mean_m;
-    row["ate_batch_m"] = batch.ate_m;
-    row["end_batch_m"] = batch.end_m;
-    const PathErrors known = batch_errors(drive, score.first_frame, Association::kRecognisable);
-    row["error_recognisable_m"] = known.mean_m;
-    row["ate_recognisable_m"] = known.ate_m;
-  }
+  row["error_without_m"] = run_drive(drive, options.config, false).error_m;
+  const PathErrors batch = batch_errors(drive, score.first_frame, Association::kTrue);
+  row["error_batch_m"] = batch.mean_m;
+  row["ate_batch_m"] = batch.ate_m;
+  const PathErrors known = batch_errors(drive, score.first_frame, Association::kRecognisable);
+  row["error_recognisable_m"] = known.mean_m;
+  row["ate_recognisable_m"] = known.ate_m;
   return row;
 }
 
@@ -168,9 +153,6 @@ void run_loops(LoopsOptions options) {
 
   const nlohmann::json config{{"seed", options.seed},
                               {"runs", options.runs},
-                              {"odometry_percent", options.drive.odometry_percent},
-                              {"odometry_deg", options.drive.odometry_deg},
-                              {"sigma_m", options.drive.sigma_m},
                               {"blind", options.blind},
                               {"reckon", options.reckon}};
   harness::write_json(options.json, harness::result_document("loops", config, rows));
@@ -184,24 +166,6 @@ std::string name_of(const std::string& folder) {
   return path.filename().string();
 }
 
-void add_noise_options(CLI::App& command, LoopDriveOptions& drive) {
-  command
-      .add_option("--odometry-percent", drive.odometry_percent,
-                  "Noise of ODOMETRY, 1 sigma per axis, in percent of the distance")
-      ->check(CLI::Range(0.0, 100.0))
-      ->capture_default_str();
-  command
-      .add_option("--odometry-deg", drive.odometry_deg,
-                  "Noise of its heading, 1 sigma per frame [degrees]")
-      ->check(CLI::Range(0.0, 90.0))
-      ->capture_default_str();
-  command
-      .add_option("--sigma-m", drive.sigma_m,
-                  "Standard deviation that LANDMARKS state, per axis [m]")
-      ->check(CLI::Range(1e-3, 10.0))
-      ->capture_default_str();
-}
-
 void add_loops_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand("loops",
                                            "Drives of stem frames that come back: loops found "
@@ -213,18 +177,11 @@ void add_loops_experiment(CLI::App& eval) {
       ->required();
   command.add_option("--config", options->config, "Configuration folder of the stages")
       ->capture_default_str();
-  add_noise_options(command, options->drive);
   command.add_option("--blind", options->blind,
                      "Share of the drive on which no stem is seen, FROM-TO");
-  command.add_option("--runs", options->runs, "Draws of the odometry for each drive")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
+  add_number(command, "--runs", options->runs, 1, 10000, "Draws of the odometry for each drive");
   command.add_option("--seed", options->seed, "Seed of the odometry")->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Runs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
-  command.add_flag("!--no-batch", options->batch, "Without the batch solution");
-  command.add_flag("!--no-without", options->without, "Without the drive without the loop closer");
+  add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
   command.add_flag("--reckon", options->reckon,
                    "The loop closer alone, beside a mapper that only reckons by odometry");
   command.add_option("--json", options->json, "Result document");

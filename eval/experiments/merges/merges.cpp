@@ -216,16 +216,11 @@ void add_map_merge_experiment(CLI::App& eval) {
       "map-merge",
       "Pairs of maps merged without a prior: doubled landmarks, offsets, wrong merges");
   const auto options = std::make_shared<MergesOptions>();
-  command.add_option("--trials", options->trials, "Pairs of maps per forest and setting")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command.add_option("--drives", options->drives, "Pairs of drives per setting")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  add_number(command, "--trials", options->trials, 1, 100000,
+             "Pairs of maps per forest and setting");
+  add_number(command, "--drives", options->drives, 1, 100000, "Pairs of drives per setting");
   command.add_option("--seed", options->seed, "Seed")->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Jobs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Jobs side by side");
   command.add_option("--data", options->data,
                      "Folder with tree_maps and stem_censuses; default $UNDERSTORY_DATA");
   command.add_option("--json", options->json, "Result document");

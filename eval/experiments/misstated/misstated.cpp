@@ -204,15 +204,11 @@ void add_misstated_experiment(CLI::App& eval) {
   auto* command = eval.add_subcommand(
       "misstated", "Drives whose sensors are not as stated: noise, mounting, clock, wheels");
   auto options = std::make_shared<MisstatedOptions>();
-  command->add_option("--runs", options->runs, "Drives per row")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  add_number(*command, "--runs", options->runs, 1, 100000, "Drives per row");
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
   command->add_option("--only", options->only,
                       "Only rows whose text has this in it, and those where nothing is wrong");
-  command->add_option("--jobs", options->jobs, "Rows side by side")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  add_number(*command, "--jobs", options->jobs, 1, 1024, "Rows side by side");
   command->add_option("--json", options->json, "Result file");
   command->callback([options] { run_guarded("misstated", [&] { run(*options); }); });
 }

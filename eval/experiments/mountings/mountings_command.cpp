@@ -167,27 +167,18 @@ void add_mountings_experiment(CLI::App& eval) {
       "mountings",
       "One wrong mounting, unit or sign of IMU, LIDAR or wheels: is the right sensor named?");
   const auto options = std::make_shared<MountingsOptions>();
-  command.add_option("--drives", options->drives, "Each with --faults trials")
-      ->check(CLI::Range(0, 100000))
-      ->capture_default_str();
-  command.add_option("--faults", options->faults, "On each drive, one after another")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  command.add_option("--sound-drives", options->sound_drives, "Without any fault, other seeds")
-      ->check(CLI::Range(0, 100000))
-      ->capture_default_str();
+  add_number(command, "--drives", options->drives, 0, 100000, "Each with --faults trials");
+  add_number(command, "--faults", options->faults, 1, 1000, "On each drive, one after another");
+  add_number(command, "--sound-drives", options->sound_drives, 0, 100000,
+             "Without any fault, other seeds");
   command.add_option("--first-seed", options->first_seed, "The others follow it")
       ->capture_default_str();
 
-  command.add_option("--length-m", options->length_m, "Of a drive [m]")
-      ->check(CLI::Range(40.0, 100000.0))
-      ->capture_default_str();
+  add_number(command, "--length-m", options->length_m, 40.0, 100000.0, "Of a drive [m]");
   command.add_option("--only", options->only, "Faults with this in their name");
   command.add_option("--config", options->config_dir, "Configuration of the chain's services")
       ->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Drives side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command.add_option("--json", options->json, "Result document");
   command.callback([options] { run_guarded("mountings", [options] { run(*options); }); });
 }

@@ -145,16 +145,11 @@ void add_partition(CLI::App& eval, const std::string& name, const std::string& d
   if (!is_closed)
     options->routes.insert(options->routes.end(), {"urban-countryside", "countryside"});
 
-  command->add_option("--runs", options->runs, "Drives per route with ideal landmarks")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command->add_option("--lidar-runs", options->lidar_runs, "Drives per route with the LIDAR chain")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  add_number(*command, "--runs", options->runs, 1, 100000, "Drives per route with ideal landmarks");
+  add_number(*command, "--lidar-runs", options->lidar_runs, 1, 100000,
+             "Drives per route with the LIDAR chain");
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
-  command->add_option("--jobs", options->jobs, "Drives side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(*command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command->add_option("--routes", options->routes, "Of the thesis; road and block are of forest")
       ->delimiter(',')
       ->check(CLI::IsMember(is_closed ? std::vector<std::string>{"urban", "block"}

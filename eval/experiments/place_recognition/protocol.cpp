@@ -1,6 +1,5 @@
 #include "eval/experiments/place_recognition/protocol.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -31,10 +30,7 @@ Trial judged(const places::PlaceAnswer& answer, const StemDrive& queries, std::s
   trial.is_accepted = trial.confidence >= kAcceptDecades;
   if (!trial.is_right) return trial;
 
-  const Eigen::Vector3d error = (best->frame_T_query.inverse() * truth).Log();
   trial.error_m = (best->frame_T_query.translation() - truth.translation()).norm();
-  trial.error_rad = std::abs(error.z());
-  trial.nees = error.dot(best->covariance.ldlt().solve(error));
   for (const places::StemPair& pair : best->pairs) trial.residual_m.push_back(pair.distance_m);
   return trial;
 }
@@ -75,7 +71,6 @@ Trials all_queries(const StemDrive& queries, const StemDrive& map, const Protoco
   result.trials.resize(queries.stems.size());
   const auto frames = static_cast<double>(std::max<std::size_t>(1, map.stems.size()));
   result.stored_bytes_per_frame = static_cast<double>(recogniser.stored_bytes()) / frames;
-  result.index_bytes_per_frame = static_cast<double>(recogniser.index_bytes()) / frames;
 
   tools::run_in_parallel(queries.stems.size(), jobs, queries.name, stop, [&](std::size_t k) {
     const std::size_t end = end_of(k);

@@ -42,8 +42,6 @@ struct Trial {
   bool is_accepted = false;  ///< By the recogniser, which knows no truth.
   double confidence = 0.0;   ///< Decades.
   double error_m = 0.0;      ///< Of the relative pose, where the answer is right.
-  double error_rad = 0.0;
-  double nees = 0.0;
   std::vector<double> residual_m;  ///< Of matched stems, likewise.
   double ms = 0.0;
 };
@@ -52,7 +50,6 @@ struct Trial {
 struct Trials {
   std::vector<Trial> trials;
   double stored_bytes_per_frame = 0.0;
-  double index_bytes_per_frame = 0.0;
 };
 
 /// An answer counts where it is likelier than this many decades not to be one of chance, not to be

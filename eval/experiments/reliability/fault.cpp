@@ -32,7 +32,7 @@ std::vector<Fault> draw_delays(const DelayPlan& plan, std::size_t count, std::mt
     faults.push_back(kinds[kind(random)]);
     faults.back().from_s = at_s;
     faults.back().to_s = at_s + lasts_s(random);
-    at_s = faults.back().to_s + plan.apart_s;
+    at_s = faults.back().to_s + kApart_s;
   }
   return faults;
 }

@@ -18,11 +18,13 @@ struct Fault {
   double to_s = 0.0;
 };
 
+/// From the end of one delay to the beginning of the next [s].
+inline constexpr double kApart_s = 12.0;
+
 /// When delays come, and of what.
 struct DelayPlan {
   double from_s = 30.0;                ///< The first one.
   double longest_s = 10.0;             ///< From 0 on, uniformly.
-  double apart_s = 12.0;               ///< From the end of one to the beginning of the next.
   std::string only;                    ///< Those with this in their name; empty = all.
   std::vector<std::string> processes;  ///< That may be stopped.
 };

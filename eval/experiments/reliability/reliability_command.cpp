@@ -34,7 +34,6 @@ struct ReliabilityOptions {
   std::uint64_t first_seed = 1;
   std::size_t faults = 20;
   double longest_s = 10.0;
-  double apart_s = 12.0;
   double length_m = 1000.0;
   std::string only;
   int load = 0;
@@ -48,10 +47,10 @@ struct ReliabilityOptions {
 /// Delays of one drive, as many as it has room for.
 std::vector<Fault> faults_of(const ReliabilityOptions& options, double drive_s,
                              std::mt19937_64& random) {
-  DelayPlan plan{kFirstFault_s, options.longest_s, options.apart_s, options.only,
+  DelayPlan plan{kFirstFault_s, options.longest_s, options.only,
                  processes_of(options.live.config_dir)};
   std::vector<Fault> faults = draw_delays(plan, std::min(options.faults, kMostFaults), random);
-  std::erase_if(faults, [&](const Fault& fault) { return fault.to_s + options.apart_s > drive_s; });
+  std::erase_if(faults, [&](const Fault& fault) { return fault.to_s + kApart_s > drive_s; });
   return faults;
 }
 
@@ -178,7 +177,6 @@ std::vector<std::uint64_t> seeds_left(const ReliabilityOptions& options,
 void run(const ReliabilityOptions& options) {
   nlohmann::json config = {{"delays", options.faults},
                            {"longest_s", options.longest_s},
-                           {"apart_s", options.apart_s},
                            {"length_m", options.length_m},
                            {"only", options.only},
                            {"load", options.load},
@@ -218,32 +216,18 @@ void add_reliability_experiment(CLI::App& eval) {
       "reliability",
       "Real processes, at the speed of the drive, while messages are held back and processes stop");
   const auto options = std::make_shared<ReliabilityOptions>();
-  command.add_option("--drives", options->drives, "Drives")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  add_number(command, "--drives", options->drives, 1, 100000, "Drives");
   command.add_option("--first-seed", options->first_seed, "The others follow it")
       ->capture_default_str();
   command.add_option("--delays", options->faults, "Most of each drive")->capture_default_str();
-  command.add_option("--longest-s", options->longest_s, "Of a delay [s]")
-      ->check(CLI::Range(0.0, 60.0))
-      ->capture_default_str();
+  add_number(command, "--longest-s", options->longest_s, 0.0, 60.0, "Of a delay [s]");
 
-  command.add_option("--apart-s", options->apart_s, "Between two delays [s]")
-      ->check(CLI::Range(4.0, 600.0))
-      ->capture_default_str();
-  command.add_option("--length-m", options->length_m, "Of a drive [m]")
-      ->check(CLI::Range(250.0, 100000.0))
-      ->capture_default_str();
+  add_number(command, "--length-m", options->length_m, 250.0, 100000.0, "Of a drive [m]");
   command.add_option("--only", options->only, "Delays with this in their name");
-  CLI::Option* load =
-      command.add_option("--load", options->load, "Processes beside them that only compute")
-          ->check(CLI::Range(0, 256))
-          ->capture_default_str();
-  command
-      .add_option("--jobs", options->jobs,
-                  "Drives at a time: each has a bus of its own and is load for the others")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
+  CLI::Option* load = add_number(command, "--load", options->load, 0, 256,
+                                 "Processes beside them that only compute");
+  add_number(command, "--jobs", options->jobs, 1, 64,
+             "Drives at a time: each has a bus of its own and is load for the others");
 
   CLI::Option* undelayed =
       command.add_flag("--undelayed", options->is_undelayed,

@@ -181,7 +181,7 @@ class Simulation {
     out.sequence = k;
     const Eigen::Vector3d noise = sigma.cwiseProduct(Eigen::Vector3d(unit(), unit(), unit()));
     out.from_T_to = poses_[k - 1].inverse() * poses_[k] * geometry::SE2::Exp(noise);
-    out.covariance = (drive_.stated_factor * sigma).array().square().matrix().asDiagonal();
+    out.covariance = sigma.array().square().matrix().asDiagonal();
     out.has_wheels = true;
     return out;
   }

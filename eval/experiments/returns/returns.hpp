@@ -17,7 +17,6 @@ struct ReturnDrive {
   double sigma_m = 0.15;     ///< Of a detection, per axis; a keyframe has eight scans.
   double range_m = 20.0;
   double blind_share = 0.3;    ///< Of the first lap.
-  double stated_factor = 1.0;  ///< Stated over true sigma of odometry.
   int laps = 3;
 };
 

@@ -65,7 +65,6 @@ nlohmann::json row_of(const std::string& map, const ReturnDrive& drive, std::uin
   return {{"map", map},
           {"drift_sigma_m", drive.drift_m},
           {"seen_share", drive.seen_share},
-          {"stated_factor", drive.stated_factor},
           {"run_seed", seed},
           {"drift_m", score.drift_m},
           {"merges", score.merges},
@@ -146,13 +145,9 @@ void add_returns_experiment(CLI::App& eval) {
   auto* command = eval.add_subcommand(
       "returns", "A drive that drifts and comes back near itself: merges, closures, NEES");
   auto options = std::make_shared<ReturnsOptions>();
-  command->add_option("--runs", options->runs, "Drives per cell")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  add_number(*command, "--runs", options->runs, 1, 100000, "Drives per cell");
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
-  command->add_option("--jobs", options->jobs, "Drives side by side")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  add_number(*command, "--jobs", options->jobs, 1, 1024, "Drives side by side");
   command->add_option("--map", options->maps,
                       "Stem maps (CSV with x_m,y_m); without one a simulated forest");
   command
@@ -164,19 +159,7 @@ void add_returns_experiment(CLI::App& eval) {
       ->delimiter(',')
       ->check(CLI::Range(0.05, 1.0))
       ->capture_default_str();
-  command->add_option("--laps", options->drive.laps, "Laps")
-      ->check(CLI::Range(2, 100))
-      ->capture_default_str();
-  command->add_option("--sigma", options->drive.sigma_m, "Of a detection, per axis [m]")
-      ->check(CLI::Range(0.001, 2.0))
-      ->capture_default_str();
-  command->add_option("--range", options->drive.range_m, "Of the sensor [m]")
-      ->check(CLI::Range(5.0, 100.0))
-      ->capture_default_str();
-  command
-      ->add_option("--stated", options->drive.stated_factor, "Stated over true sigma of odometry")
-      ->check(CLI::Range(0.1, 10.0))
-      ->capture_default_str();
+  add_number(*command, "--laps", options->drive.laps, 2, 100, "Laps");
   command->add_option("--json", options->json, "Result file");
   command->callback([options] { run_guarded("returns", [options] { run(*options); }); });
 }

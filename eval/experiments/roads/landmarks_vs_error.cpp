@@ -287,12 +287,12 @@ void add_landmarks_vs_error_experiment(CLI::App& eval) {
       "landmarks-vs-error", "Change of the error against the number of landmarks in view");
   auto options = std::make_shared<Options>();
   command->add_option("--seed", options->seed, "Seed of everything");
-  command->add_option("--jobs", options->jobs, "Drives side by side")->check(CLI::Range(1, 256));
-  command->add_option("--runs", options->runs, "Of each route, in a world of its own each")
-      ->check(CLI::Range(1, 1000));
+  add_number(*command, "--jobs", options->jobs, 1, 256, "Drives side by side");
+  add_number(*command, "--runs", options->runs, 1, 1000,
+             "Of each route, in a world of its own each");
   command->add_flag("!--no-wheels", options->wheels, "An IMU alone, as in the thesis on submaps");
-  command->add_option("--length-m", options->length_m, "Of the city routes; the country is 1.5 x")
-      ->check(CLI::Range(200.0, 100000.0));
+  add_number(*command, "--length-m", options->length_m, 200.0, 100000.0,
+             "Of the city routes; the country is 1.5 x");
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
   command->add_flag("!--no-plots", options->plots, "No plots");

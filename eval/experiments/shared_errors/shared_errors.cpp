@@ -70,7 +70,6 @@ nlohmann::json row_of(const loops::LoopDrive& drive, const loops::LoopScore& sco
           {"in_map", score.in_map},
           {"ate_m", score.ate_m},
           {"ate_batch_m", batch.ate_m},
-          {"ate_ratio", score.ate_m / batch.ate_m},
           {"ate_live_m", fate.live_ate_m},
           {"live_poses", fate.live_poses},
           {"nees", fate.nees},
@@ -204,9 +203,6 @@ void run_shared_errors(const SharedErrorsOptions& options) {
                               {"runs", options.runs},
                               {"config", options.config},
                               {"recorded", options.recorded},
-                              {"odometry_percent", options.inputs.odometry_percent},
-                              {"odometry_deg", options.inputs.odometry_deg},
-                              {"sigma_m", options.inputs.sigma_m},
                               {"truth_sigma_m", options.inputs.truth_sigma.position_m},
                               {"truth_sigma_rad", options.inputs.truth_sigma.heading_rad}};
   harness::write_json(options.json, harness::result_document("shared-errors", config, rows));
@@ -233,10 +229,8 @@ void add_shared_errors_experiment(CLI::App& eval) {
                   "Folders of recorded frames (frame_<n>.csv, trajectory.txt); runs draw the "
                   "odometry")
       ->check(CLI::ExistingDirectory);
-  command
-      .add_option("--truth-sigma-m", options->inputs.truth_sigma.position_m,
-                  "Standard deviation of recorded true positions, per axis; for NEES")
-      ->check(CLI::Range(0.0, 100.0));
+  add_number(command, "--truth-sigma-m", options->inputs.truth_sigma.position_m, 0.0, 100.0,
+             "Standard deviation of recorded true positions, per axis; for NEES");
   const auto truth_sigma_deg = std::make_shared<double>(0.0);
   command
       .add_option("--truth-sigma-deg", *truth_sigma_deg,
@@ -253,16 +247,10 @@ void add_shared_errors_experiment(CLI::App& eval) {
 
   command.add_option("--config", options->config, "Configuration folder of the stages")
       ->capture_default_str();
-
-  loops::add_noise_options(command, options->inputs);
-  command.add_option("--runs", options->runs, "Drives through each map")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
+  add_number(command, "--runs", options->runs, 1, 10000, "Drives through each map");
   command.add_option("--seed", options->seed, "Seed of ways, errors and odometry")
       ->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Runs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
   command.add_option("--json", options->json, "Result document");
 
   command.callback([options, truth_sigma_deg] {

@@ -108,7 +108,6 @@ VictoriaParkRun drive_victoria_park(const io::VictoriaPark& recording,
   Drive drive(config, run);
   auto motion = run.odometry.begin();
   for (const model::PlanarScan& scan : recording.scans) {
-    if (static_cast<double>(scan.utime) * 1e-6 > config.end_s) break;
     for (; motion != run.odometry.end() && motion->utime <= scan.utime; ++motion)
       drive.add(*motion);
     drive.add(scan);

@@ -23,7 +23,6 @@ struct VictoriaParkConfig {
   landmark_extractor::LandmarkExtractorParameters extractor;
   keyframer::JointKeyframerParameters keyframer;
   geoslam_mapper::SmoothingMapperParameters mapper;
-  double end_s = 1e9;  ///< Stop the drive here [s].
 };
 
 /// Joint keyframes, the smoothing mapper, dead reckoning between keyframes.

@@ -20,7 +20,6 @@ namespace fs = std::filesystem;
 struct Options {
   std::string data;
   std::string json;
-  double end_s = 1e9;
   bool plots = true;
 };
 
@@ -49,7 +48,7 @@ void write_results(const Options& options, const VictoriaParkReport& report) {
   nlohmann::json details = to_json(report);
   nlohmann::json rows = details["rows"];
   harness::write_json(options.json,
-                      harness::result_document("victoria-park", {{"end_s", options.end_s}}, rows));
+                      harness::result_document("victoria-park", nlohmann::json::object(), rows));
   harness::write_json(harness::traces_file(options.json), details);
   if (options.plots) {
     harness::plot("victoria_park.py", {options.json, harness::traces_file(options.json).string()});
@@ -62,7 +61,6 @@ void run(const Options& options) {
   const io::VictoriaPark recording = io::read_victoria_park(sources.recording);
 
   VictoriaParkConfig config = victoria_park_defaults();
-  config.end_s = options.end_s;
   VictoriaParkRun driven = [&] {
     terminal::Progress progress("victoria-park", static_cast<double>(recording.scans.size()),
                                 terminal::Progress::Without::kSeconds);
@@ -94,7 +92,6 @@ void add_victoria_park_experiment(CLI::App& eval) {
                       "Folder with victoria_park_raw, or the recording itself (zip or folder); "
                       "default $UNDERSTORY_DATA");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
-  command->add_option("--end", options->end_s, "Stop the drive here [s]");
   command->add_flag("!--no-plots", options->plots, "No plots");
   command->callback([options] { run_guarded("victoria-park", [options] { run(*options); }); });
 }

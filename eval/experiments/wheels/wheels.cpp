@@ -300,17 +300,16 @@ void add_wheels_experiment(CLI::App& eval) {
   auto* command = eval.add_subcommand(
       "wheels", "The chain with wheels, with exact ones and without, on the same drives");
   auto options = std::make_shared<Options>();
-  command->add_option("--seeds", options->seeds, "How many")->check(CLI::Range(1, 1000));
+  add_number(*command, "--seeds", options->seeds, 1, 1000, "How many");
   command->add_option("--first-seed", options->first_seed, "The others follow it");
-  command->add_option("--length-m", options->length_m, "Of all but urban")
-      ->check(CLI::Range(50.0, 100000.0));
+  add_number(*command, "--length-m", options->length_m, 50.0, 100000.0, "Of all but urban");
   command->add_option("--lidar", options->lidar, "vlp32 (default) or vlp16")
       ->check(CLI::IsMember({"vlp32", "vlp16"}));
   command->add_option("--worlds", options->worlds, "forest, urban, urban-countryside, countryside")
       ->delimiter(',')
       ->check(CLI::IsMember({"forest", "urban", "urban-countryside", "countryside"}));
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
-  command->add_option("--jobs", options->jobs, "Drives side by side")->check(CLI::Range(1, 256));
+  add_number(*command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command->add_option(
       "--json", options->json,
       "Results; FILE.progress beside it has what is done, and a later call goes on");

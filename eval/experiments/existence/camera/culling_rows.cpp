@@ -103,7 +103,6 @@ nlohmann::json points_part(const Pool& pool) {
           {"hidden_points", pool.hidden.size()},
           {"hidden_removed_pct", 100.0 * removed_share(pool.hidden, true)},
           {"all_points", all.size()},
-          {"gone_of_all_pct", gone_pct(all)},
           {"all_gone_removed_pct", 100.0 * removed_share(all, false)},
           {"all_wrongly_removed_pct", 100.0 * removed_share(all, true)},
           {"all_auc", roc_area(all)},

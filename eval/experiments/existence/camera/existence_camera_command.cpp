@@ -195,14 +195,10 @@ void add_existence_camera_experiment(CLI::App& eval) {
                                            "What culling is worth to a camera that comes back: "
                                            "relocalisation, tracking, mapping needed");
   const auto options = std::make_shared<CameraOptions>();
-  command.add_option("--runs", options->runs, "Worlds per kind and share")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_number(command, "--runs", options->runs, 1, 1000, "Worlds per kind and share");
   command.add_option("--seed", options->seed, "Seed of the first world; tuned on 100001")
       ->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Jobs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Jobs side by side");
   command.add_option("--json", options->json, "Result document");
   command.add_flag("--no-plots", options->no_plots, "No pictures");
   command.callback(

@@ -43,7 +43,6 @@ std::map<std::string, std::string> census_parameters(const CensusOptions& option
                       {"looks", toml::table{{"use_ranges", options.use_ranges}}},
                       // All that changes is told, so that the order of the probabilities is seen.
                       {"output", toml::table{{"told_change", 0.0}}}};
-  if (options.pass_m > 0.0) tracker["looks"].as_table()->insert("pass_m", options.pass_m);
   if (!map.empty())
     for (toml::table* const one : {&mapper, &tracker})
       one->insert("input", toml::table{{"map_file", map.string()}});

@@ -16,7 +16,6 @@ struct CensusOptions {
   ForestSetting forest;
   double decay_per_s = 8e-10;  ///< Learned from trees elsewhere.
   double decay_weight = 20.0;  ///< What it counts for, in trees.
-  double pass_m = 0.0;         ///< `looks.pass_m`; 0: as configured.
   bool use_ranges = true;      ///< VIEW_RANGES are sent.
   bool share_errors = false;   ///< Detections share errors from scan to scan.
   /// The map file states how sure each landmark is in the frame of the first keyframe (0.7 m at the

@@ -228,13 +228,9 @@ void add_existence_census_experiment(CLI::App& eval) {
       "A real forest at two censuses, driven through keyframer, mapper and existence tracker");
   const auto options = std::make_shared<CensusCommand>();
   options->census.forest.scan_every_m = 0.5;
-  command.add_option("--runs", options->runs, "Sets of drives")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_number(command, "--runs", options->runs, 1, 1000, "Sets of drives");
   command.add_option("--seed", options->seed, "Seed of the first one")->capture_default_str();
-  command.add_option("--jobs", options->jobs, "Runs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
   command
       .add_option("--missed", options->missed,
                   "Share of the stems that a drive misses: one of the two alone")
@@ -248,11 +244,7 @@ void add_existence_census_experiment(CLI::App& eval) {
       ->delimiter(',')
       ->check(CLI::IsMember({"shared", "independent"}))
       ->capture_default_str();
-  command.add_option("--drives", options->census.forest.drives, "After the one that maps")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  command.add_option("--pass-m", options->census.pass_m, "looks.pass_m instead of the configured")
-      ->check(CLI::Range(1.0, 1e6));
+  add_number(command, "--drives", options->census.forest.drives, 1, 100, "After the one that maps");
   command.add_option("--logs", options->census.logs,
                      "Folder for the inputs of each drive, as logs, and the maps");
   command.add_flag("--state-covariances", options->census.state_covariances,
