@@ -1,8 +1,8 @@
 #include "services/associator/adapter.hpp"
 
 #include <memory>
-#include <optional>
 
+#include "common/bus/watched_adapter.hpp"
 #include "services/associator/adapter_parameters.hpp"
 #include "services/associator/associator.hpp"
 #include "services/associator/health_watch.hpp"
@@ -10,21 +10,14 @@
 namespace understory::associator {
 namespace {
 
-constexpr state::Format kServiceFormat{"associator_service", 2};
-
-class AssociatorAdapter : public bus::Adapter {
+class AssociatorAdapter
+    : public bus::WatchedAdapter<Associator, AssociatorParameters, HealthWatch, HealthParameters> {
  public:
-  explicit AssociatorAdapter(AssociatorChannels channels) : channels_(std::move(channels)) {}
-
-  void describe(bus::ParameterTable& table) override {
-    associator::describe(parameters_, table);
-    associator::describe(health_, table);
-  }
+  explicit AssociatorAdapter(AssociatorChannels channels)
+      : WatchedAdapter({"associator_service", 2}), channels_(std::move(channels)) {}
 
   void bind(bus::Node& node) override {
-    node_ = &node;
-    stage_.emplace(parameters_);
-    watch_ = HealthWatch(health_);
+    begin(node, parameters_);
 
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
                                         [this](const model::LandmarkScan& scan) { add(scan); },
@@ -39,17 +32,6 @@ class AssociatorAdapter : public bus::Adapter {
     tracked_ = node.advertise<model::TrackedScan>(channels_.tracked_landmarks);
   }
 
-  std::string save() const override { return state::save(kServiceFormat, watch_, stage_->save()); }
-
-  void load(const std::string& state) override {
-    HealthWatch watch(health_);
-    std::string stage;
-    state::load(state, kServiceFormat, watch, stage);
-    stage_->load(stage);
-    watch_ = watch;
-    show_health();
-  }
-
  private:
   void add(const model::LandmarkScan& scan) {
     const AssociatorCounters before = stage_->counters();
@@ -59,21 +41,12 @@ class AssociatorAdapter : public bus::Adapter {
     show_health();
   }
 
-  void show_health() {
-    for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
-  }
-
   std::size_t most_bytes() const {
     return wire::bytes_with<landmarks_t, detection_t>(
         static_cast<std::size_t>(parameters_.max_detections));
   }
 
   AssociatorChannels channels_;
-  AssociatorParameters parameters_;
-  HealthParameters health_;
-  HealthWatch watch_;
-  bus::Node* node_ = nullptr;
-  std::optional<Associator> stage_;
   bus::Publisher<model::TrackedScan> tracked_;
 };
 

@@ -1,8 +1,8 @@
 #include "services/ekf/adapter.hpp"
 
 #include <memory>
-#include <optional>
 
+#include "common/bus/watched_adapter.hpp"
 #include "services/ekf/adapter_parameters.hpp"
 #include "services/ekf/ekf.hpp"
 #include "services/ekf/health_watch.hpp"
@@ -10,22 +10,14 @@
 namespace understory::ekf {
 namespace {
 
-constexpr state::Format kServiceFormat{"ekf_service", 3};
-
-class EkfAdapter : public bus::Adapter {
+class EkfAdapter : public bus::WatchedAdapter<Ekf, EkfParameters, HealthWatch, HealthParameters> {
  public:
-  explicit EkfAdapter(EkfChannels channels) : channels_(std::move(channels)) {}
-
-  void describe(bus::ParameterTable& table) override {
-    ekf::describe(parameters_, table);
-    ekf::describe(health_, table);
-  }
+  explicit EkfAdapter(EkfChannels channels)
+      : WatchedAdapter({"ekf_service", 3}), channels_(std::move(channels)) {}
 
   void bind(bus::Node& node) override {
-    node_ = &node;
-    stage_.emplace(parameters_);
-    watch_ = HealthWatch(health_);
-    // A dropped increment is a gap in the motion: a long queue.
+    begin(node, parameters_);
+    // An increment that the queue drops is a gap in the motion: the queue is long.
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& increment) { add(increment); },
                                     {.queue_size = 2000});
@@ -41,17 +33,6 @@ class EkfAdapter : public bus::Adapter {
     corrections_ = node.advertise<model::VelocityCorrection>(channels_.velocity_correction);
   }
 
-  std::string save() const override { return state::save(kServiceFormat, watch_, stage_->save()); }
-
-  void load(const std::string& state) override {
-    HealthWatch watch(health_);
-    std::string stage;
-    state::load(state, kServiceFormat, watch, stage);
-    stage_->load(stage);
-    watch_ = watch;
-    show_health();
-  }
-
  private:
   template <class Message>
   void add(const Message& message) {
@@ -60,10 +41,6 @@ class EkfAdapter : public bus::Adapter {
     watch_.add(output, before, stage_->counters());
     publish(output);
     show_health();
-  }
-
-  void show_health() {
-    for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
   }
 
   std::size_t most_bytes() const {
@@ -85,11 +62,6 @@ class EkfAdapter : public bus::Adapter {
   }
 
   EkfChannels channels_;
-  EkfParameters parameters_;
-  HealthParameters health_;
-  HealthWatch watch_;
-  bus::Node* node_ = nullptr;
-  std::optional<Ekf> stage_;
   std::uint64_t restarts_ = 0;
   bus::Publisher<model::EkfPose> poses_;
   bus::Publisher<model::EkfMap> maps_;

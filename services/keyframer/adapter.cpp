@@ -4,8 +4,8 @@
 
 #include <memory>
 #include <numbers>
-#include <optional>
 
+#include "common/bus/watched_adapter.hpp"
 #include "services/keyframer/adapter_parameters.hpp"
 #include "services/keyframer/health_watch.hpp"
 #include "services/keyframer/joint/joint_keyframer.hpp"
@@ -13,21 +13,14 @@
 namespace understory::keyframer {
 namespace {
 
-constexpr state::Format kServiceFormat{"keyframer_service", 4};
-
-class KeyframerAdapter : public bus::Adapter {
+class KeyframerAdapter : public bus::WatchedAdapter<joint::JointKeyframer, KeyframerParameters,
+                                                    HealthWatch, HealthParameters> {
  public:
-  explicit KeyframerAdapter(KeyframerChannels channels) : channels_(std::move(channels)) {}
-
-  void describe(bus::ParameterTable& table) override {
-    keyframer::describe(parameters_, table);
-    keyframer::describe(health_, table);
-  }
+  explicit KeyframerAdapter(KeyframerChannels channels)
+      : WatchedAdapter({"keyframer_service", 4}), channels_(std::move(channels)) {}
 
   void bind(bus::Node& node) override {
-    node_ = &node;
-    stage_.emplace(parameters_.joint);
-    watch_ = HealthWatch(health_);
+    begin(node, parameters_.joint);
 
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
                                         [this](const model::LandmarkScan& scan) { add(scan); },
@@ -40,17 +33,6 @@ class KeyframerAdapter : public bus::Adapter {
                                     [this](const model::EkfLevel& level) { stage_->add(level); });
 
     keyframes_ = node.advertise<model::Keyframe>(channels_.keyframe);
-  }
-
-  std::string save() const override { return state::save(kServiceFormat, watch_, stage_->save()); }
-
-  void load(const std::string& state) override {
-    HealthWatch watch(health_);
-    std::string stage;
-    state::load(state, kServiceFormat, watch, stage);
-    stage_->load(stage);
-    watch_ = watch;
-    show_health();
   }
 
  private:
@@ -85,21 +67,12 @@ class KeyframerAdapter : public bus::Adapter {
         channels_.landmarks);
   }
 
-  void show_health() {
-    for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
-  }
-
   std::size_t most_bytes() const {
     return wire::bytes_with<landmarks_t, detection_t>(
         static_cast<std::size_t>(parameters_.max_detections));
   }
 
   KeyframerChannels channels_;
-  KeyframerParameters parameters_;
-  HealthParameters health_;
-  HealthWatch watch_;
-  bus::Node* node_ = nullptr;
-  std::optional<joint::JointKeyframer> stage_;
   bus::Publisher<model::Keyframe> keyframes_;
 };
 

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "common/bus/watched_adapter.hpp"
 #include "services/loop_closer/adapter_parameters.hpp"
 #include "services/loop_closer/health_watch.hpp"
 #include "services/loop_closer/loop_closer.hpp"
@@ -12,23 +13,16 @@
 namespace understory::loop_closer {
 namespace {
 
-constexpr state::Format kServiceFormat{"loop_closer_service", 2};
-
-class LoopCloserAdapter : public bus::Adapter {
+class LoopCloserAdapter
+    : public bus::WatchedAdapter<LoopCloser, LoopCloserParameters, HealthWatch, HealthParameters> {
  public:
-  explicit LoopCloserAdapter(LoopCloserChannels channels) : channels_(std::move(channels)) {}
-
-  void describe(bus::ParameterTable& table) override {
-    loop_closer::describe(parameters_, table);
-    loop_closer::describe(health_, table);
-  }
+  explicit LoopCloserAdapter(LoopCloserChannels channels)
+      : WatchedAdapter({"loop_closer_service", 2}), channels_(std::move(channels)) {}
 
   void bind(bus::Node& node) override {
-    node_ = &node;
     if (const std::string fault = fault_of(parameters_.search); !fault.empty())
       throw bus::ConfigurationError({fault});
-    stage_ = std::make_unique<LoopCloser>(parameters_);
-    watch_ = HealthWatch(health_);
+    begin(node, parameters_);
 
     // A search sometimes takes longer than the interval of keyframes: long queues.
     node.subscribe<model::Keyframe>(
@@ -48,17 +42,6 @@ class LoopCloserAdapter : public bus::Adapter {
                                       [this](const model::LoopResult& result) { add(result); },
                                       {.queue_size = 200, .timed = false});
     closures_ = node.advertise<model::LoopClosure>(channels_.loop_closure);
-  }
-
-  std::string save() const override { return state::save(kServiceFormat, watch_, stage_->save()); }
-
-  void load(const std::string& state) override {
-    HealthWatch watch(health_);
-    std::string stage;
-    state::load(state, kServiceFormat, watch, stage);
-    stage_->load(stage);
-    watch_ = watch;
-    show_health();
   }
 
  private:
@@ -92,16 +75,7 @@ class LoopCloserAdapter : public bus::Adapter {
                channels_.loop_closure);
   }
 
-  void show_health() {
-    for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
-  }
-
   LoopCloserChannels channels_;
-  LoopCloserParameters parameters_;
-  HealthParameters health_;
-  HealthWatch watch_;
-  bus::Node* node_ = nullptr;
-  std::unique_ptr<LoopCloser> stage_;
   bus::Publisher<model::LoopClosure> closures_;
 };
 
