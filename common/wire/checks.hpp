@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "common/geometry/se2.hpp"
 #include "common/wire/result.hpp"
@@ -45,6 +46,12 @@ class Checks {
 
   /// The first failure; none if all checks passed.
   const std::optional<Refusal>& refusal() const { return refusal_; }
+  /// The value, moved from where it was made, or the first failure.
+  template <class T>
+  Result<T> result(T& value) const {
+    if (refusal_) return *refusal_;
+    return std::move(value);
+  }
 
  private:
   void check_covariance(std::string_view field, const Eigen::Matrix2d& matrix);

@@ -20,19 +20,16 @@ Result<model::RawPose> from_wire(const raw_pose_t& wire) {
   Checks checks;
   checks.pose("odom_T_vehicle", wire.odom_T_vehicle);
   model::RawPose pose;
-  pose.utime = wire.utime;
-  pose.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, pose);
   pose.odom_T_vehicle = from_wire(wire.odom_T_vehicle);
   pose.covariance = checks.covariance("covariance", wire.covariance);
   pose.is_reference = wire.is_reference != 0;
-  if (checks.refusal()) return *checks.refusal();
-  return pose;
+  return checks.result(pose);
 }
 
 raw_pose_t to_wire(const model::RawPose& pose) {
   raw_pose_t wire{};
-  wire.utime = pose.utime;
-  wire.seq = static_cast<std::int64_t>(pose.sequence);
+  put_stamp(pose, wire);
   wire.odom_T_vehicle = to_wire(pose.odom_T_vehicle);
   copy_matrix(pose.covariance, wire.covariance);
   wire.is_reference = pose.is_reference ? 1 : 0;
@@ -50,8 +47,7 @@ Result<model::EkfPose> from_wire(const ekf_pose_t& wire) {
   checks.range("reset_counter", static_cast<double>(wire.reset_counter), 0.0, 9.3e18);
 
   model::EkfPose pose;
-  pose.utime = wire.utime;
-  pose.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, pose);
   pose.ekf_map_T_vehicle = from_wire(wire.ekf_map_T_vehicle);
   pose.covariance = checks.covariance("covariance", wire.covariance);
   pose.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
@@ -61,15 +57,12 @@ Result<model::EkfPose> from_wire(const ekf_pose_t& wire) {
   pose.landmarks_used = static_cast<std::uint32_t>(wire.landmarks_used);
   pose.landmarks_refused = static_cast<std::uint32_t>(wire.landmarks_refused);
   pose.reset_counter = static_cast<std::uint64_t>(wire.reset_counter);
-  if (checks.refusal()) return *checks.refusal();
-
-  return pose;
+  return checks.result(pose);
 }
 
 ekf_pose_t to_wire(const model::EkfPose& pose) {
   ekf_pose_t wire{};
-  wire.utime = pose.utime;
-  wire.seq = static_cast<std::int64_t>(pose.sequence);
+  put_stamp(pose, wire);
   wire.ekf_map_T_vehicle = to_wire(pose.ekf_map_T_vehicle);
   copy_matrix(pose.covariance, wire.covariance);
   copy_vector(pose.velocity_mps, wire.velocity_m_s);
@@ -87,8 +80,7 @@ ekf_pose_t to_wire(const model::EkfPose& pose) {
 Result<model::EkfMap> from_wire(const ekf_map_t& wire) {
   Checks checks;
   model::EkfMap map;
-  map.utime = wire.utime;
-  map.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, map);
   map.landmarks.reserve(wire.landmarks.size());
 
   for (std::size_t i = 0; i < wire.landmarks.size(); ++i) {
@@ -105,15 +97,12 @@ Result<model::EkfMap> from_wire(const ekf_map_t& wire) {
     landmark.kind = static_cast<model::LandmarkKind>(from.kind);
     landmark.observation_count = static_cast<std::uint32_t>(from.times_seen);
   }
-
-  if (checks.refusal()) return *checks.refusal();
-  return map;
+  return checks.result(map);
 }
 
 ekf_map_t to_wire(const model::EkfMap& map) {
   ekf_map_t wire{};
-  wire.utime = map.utime;
-  wire.seq = static_cast<std::int64_t>(map.sequence);
+  put_stamp(map, wire);
   wire.num_landmarks = static_cast<std::int32_t>(map.landmarks.size());
   wire.landmarks.reserve(map.landmarks.size());
 
@@ -134,19 +123,16 @@ Result<model::EkfLevel> from_wire(const ekf_level_t& wire) {
   Checks checks;
   check_all("error_rad", wire.error_rad, kLargestLevel_rad, checks);
   model::EkfLevel level;
-  level.utime = wire.utime;
-  level.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, level);
   level.error_rad = Eigen::Map<const Eigen::Vector2d>(wire.error_rad);
   level.covariance = checks.covariance("covariance", wire.covariance);
   level.reported_covariance = checks.covariance("told_covariance", wire.told_covariance);
-  if (checks.refusal()) return *checks.refusal();
-  return level;
+  return checks.result(level);
 }
 
 ekf_level_t to_wire(const model::EkfLevel& level) {
   ekf_level_t wire{};
-  wire.utime = level.utime;
-  wire.seq = static_cast<std::int64_t>(level.sequence);
+  put_stamp(level, wire);
   copy_vector(level.error_rad, wire.error_rad);
   copy_matrix(level.covariance, wire.covariance);
   copy_matrix(level.reported_covariance, wire.told_covariance);
@@ -163,8 +149,7 @@ model::RestLevel rest_level(const Wire& wire, Checks& checks) {
                     "rest_from_utime <= rest_utime <= utime");
   check_all("error_rad", wire.error_rad, kLargestLevel_rad, checks);
   model::RestLevel level;
-  level.utime = wire.utime;
-  level.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, level);
   level.rest_from_utime = wire.rest_from_utime;
   level.rest_utime = wire.rest_utime;
   level.error_rad = Eigen::Map<const Eigen::Vector2d>(wire.error_rad);
@@ -178,22 +163,19 @@ model::RestLevel rest_level(const Wire& wire, Checks& checks) {
 Result<model::RestLevel> from_wire(const rest_level_t& wire) {
   Checks checks;
   model::RestLevel level = rest_level(wire, checks);
-  if (checks.refusal()) return *checks.refusal();
-  return level;
+  return checks.result(level);
 }
 
 Result<model::RestLevel> from_wire(const rest_level2_t& wire) {
   Checks checks;
   model::RestLevel level = rest_level(wire, checks);
   level.change_covariance = checks.covariance("change_covariance", wire.change_covariance);
-  if (checks.refusal()) return *checks.refusal();
-  return level;
+  return checks.result(level);
 }
 
 rest_level2_t to_wire(const model::RestLevel& level) {
   rest_level2_t wire{};
-  wire.utime = level.utime;
-  wire.seq = static_cast<std::int64_t>(level.sequence);
+  put_stamp(level, wire);
   wire.rest_from_utime = level.rest_from_utime;
   wire.rest_utime = level.rest_utime;
   copy_vector(level.error_rad, wire.error_rad);
@@ -207,19 +189,16 @@ Result<model::VelocityCorrection> from_wire(const velocity_correction_t& wire) {
   check_all("velocity_m_s", wire.velocity_m_s, kFastestMps, checks);
   check_all("bias", wire.bias, kLargestBias, checks);
   model::VelocityCorrection correction;
-  correction.utime = wire.utime;
-  correction.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, correction);
   correction.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
   correction.bias = Eigen::Map<const Eigen::Vector3d>(wire.bias);
   correction.covariance = checks.covariance("covariance", wire.covariance);
-  if (checks.refusal()) return *checks.refusal();
-  return correction;
+  return checks.result(correction);
 }
 
 velocity_correction_t to_wire(const model::VelocityCorrection& correction) {
   velocity_correction_t wire{};
-  wire.utime = correction.utime;
-  wire.seq = static_cast<std::int64_t>(correction.sequence);
+  put_stamp(correction, wire);
   copy_vector(correction.velocity_mps, wire.velocity_m_s);
   copy_vector(correction.bias, wire.bias);
   copy_matrix(correction.covariance, wire.covariance);

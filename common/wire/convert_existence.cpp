@@ -46,8 +46,7 @@ std::uint64_t existence_hash(const model::ExistenceState& state) {
 Result<model::Existence> from_wire(const existence_t& wire) {
   Checks checks;
   model::Existence existence;
-  existence.utime = wire.utime;
-  existence.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, existence);
   existence.map_id = existence_map_id(wire.map_id, checks);
   existence.is_whole = wire.whole != 0;
   existence.landmarks = existences(wire.landmarks, checks);
@@ -60,14 +59,12 @@ Result<model::Existence> from_wire(const existence_t& wire) {
   existence.missing_share = wire.missing_share;
   existence.new_share = wire.new_share;
   existence.is_mapping_needed = wire.mapping_needed != 0;
-  if (checks.refusal()) return *checks.refusal();
-  return existence;
+  return checks.result(existence);
 }
 
 existence_t to_wire(const model::Existence& existence) {
   existence_t wire{};
-  wire.utime = existence.utime;
-  wire.seq = static_cast<std::int64_t>(existence.sequence);
+  put_stamp(existence, wire);
   wire.map_id = static_cast<std::int32_t>(existence.map_id);
   wire.whole = existence.is_whole ? 1 : 0;
   wire.landmarks = to_wire(existence.landmarks);
@@ -83,8 +80,7 @@ existence_t to_wire(const model::Existence& existence) {
 Result<model::ExistenceState> from_wire(const existence_state_t& wire) {
   Checks checks;
   model::ExistenceState state;
-  state.utime = wire.utime;
-  state.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, state);
   state.map_id = existence_map_id(wire.map_id, checks);
   state.landmarks = existences(wire.landmarks, checks);
   state.model.assign(wire.model.begin(), wire.model.end());
@@ -94,14 +90,12 @@ Result<model::ExistenceState> from_wire(const existence_state_t& wire) {
   checks.consistent(fits, "each landmark has the same number of state_bytes");
   checks.consistent(existence_hash(state) == static_cast<std::uint64_t>(wire.content_hash),
                     "content_hash is that of model and states");
-  if (checks.refusal()) return *checks.refusal();
-  return state;
+  return checks.result(state);
 }
 
 existence_state_t to_wire(const model::ExistenceState& state) {
   existence_state_t wire{};
-  wire.utime = state.utime;
-  wire.seq = static_cast<std::int64_t>(state.sequence);
+  put_stamp(state, wire);
   wire.map_id = static_cast<std::int32_t>(state.map_id);
   wire.landmarks = to_wire(state.landmarks);
   wire.num_landmarks = static_cast<std::int32_t>(wire.landmarks.size());

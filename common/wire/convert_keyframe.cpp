@@ -11,8 +11,7 @@ model::KeyframeMember member(const keyframe_member_t& wire, Checks& checks) {
   checks.range("seq", static_cast<double>(wire.seq), 0.0, 9.3e18);
   checks.pose("centre_T_vehicle", wire.centre_T_vehicle);
   model::KeyframeMember result;
-  result.utime = wire.utime;
-  result.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, result);
   result.centre_T_vehicle = from_wire(wire.centre_T_vehicle);
   result.covariance = checks.covariance("covariance", wire.covariance);
   return result;
@@ -48,8 +47,7 @@ template <class Wire>
 model::Keyframe keyframe_of(const Wire& wire, Checks& checks) {
   check_order(wire, checks);
   model::Keyframe keyframe;
-  keyframe.utime = wire.utime;
-  keyframe.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, keyframe);
   keyframe.field_of_view = field_of_view(wire, checks);
 
   if (wire.has_previous != 0) {
@@ -99,21 +97,18 @@ Result<model::Keyframe> from_wire(const keyframe2_t& wire) {
   Checks checks;
   model::Keyframe keyframe = keyframe_of(wire, checks);
   keyframe.detections = detections(wire, checks);
-  if (checks.refusal()) return *checks.refusal();
-  return keyframe;
+  return checks.result(keyframe);
 }
 
 Result<model::Keyframe> from_wire(const keyframe_t& wire) {
   Checks checks;
   model::Keyframe keyframe = keyframe_of(wire, checks);
-  if (checks.refusal()) return *checks.refusal();
-  return keyframe;
+  return checks.result(keyframe);
 }
 
 keyframe2_t to_wire(const model::Keyframe& keyframe) {
   keyframe2_t wire{};
-  wire.utime = keyframe.utime;
-  wire.seq = static_cast<std::int64_t>(keyframe.sequence);
+  put_stamp(keyframe, wire);
   copy_field_of_view(keyframe.field_of_view, wire);
   wire.has_previous = keyframe.previous_T_base.has_value() ? 1 : 0;
   wire.previous_T_base = to_wire(keyframe.previous_T_base.value_or(geometry::SE2()));

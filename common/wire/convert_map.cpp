@@ -7,20 +7,17 @@ Result<model::WholeMap> from_wire(const map_t& wire) {
   Checks checks;
   checks.range("version", static_cast<double>(wire.version), 0.0, 9.3e18);
   model::WholeMap map;
-  map.utime = wire.utime;
-  map.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, map);
   map.version = static_cast<std::uint64_t>(wire.version);
   map.complete = wire.complete != 0;
   map.landmarks = landmarks("landmarks", wire.landmarks, checks);
   map.keyframes = keyframe_poses(wire.keyframes, checks);
-  if (checks.refusal()) return *checks.refusal();
-  return map;
+  return checks.result(map);
 }
 
 map_t to_wire(const model::WholeMap& map) {
   map_t wire{};
-  wire.utime = map.utime;
-  wire.seq = static_cast<std::int64_t>(map.sequence);
+  put_stamp(map, wire);
   wire.version = static_cast<std::int64_t>(map.version);
   wire.complete = map.complete ? 1 : 0;
   wire.landmarks = to_wire(map.landmarks);
@@ -35,23 +32,19 @@ Result<model::MapDelta> from_wire(const map_delta_t& wire) {
   checks.consistent(wire.base_version >= 0 && wire.base_version < wire.version,
                     "base_version < version");
   model::MapDelta delta;
-  delta.utime = wire.utime;
-  delta.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, delta);
   delta.base_version = static_cast<std::uint64_t>(wire.base_version);
   delta.version = static_cast<std::uint64_t>(wire.version);
   delta.added = landmarks("added", wire.added, checks);
   delta.moved = landmarks("moved", wire.moved, checks);
   delta.removed = ids("removed", wire.removed, checks);
   delta.merged = merges(wire.merged, checks);
-  if (checks.refusal()) return *checks.refusal();
-
-  return delta;
+  return checks.result(delta);
 }
 
 map_delta_t to_wire(const model::MapDelta& delta) {
   map_delta_t wire{};
-  wire.utime = delta.utime;
-  wire.seq = static_cast<std::int64_t>(delta.sequence);
+  put_stamp(delta, wire);
   wire.base_version = static_cast<std::int64_t>(delta.base_version);
   wire.version = static_cast<std::int64_t>(delta.version);
   wire.added = to_wire(delta.added);

@@ -10,8 +10,7 @@ Result<model::PlaceScan> from_wire(const place_scan_t& wire) {
   if (checks.refusal()) return *checks.refusal();
 
   model::PlaceScan scan;
-  scan.utime = wire.utime;
-  scan.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, scan);
   scan.points.reserve(wire.x_cm.size());
   for (std::size_t i = 0; i < wire.x_cm.size(); ++i)
     scan.points.push_back({wire.x_cm[i], wire.y_cm[i], wire.z_cm[i]});
@@ -20,8 +19,7 @@ Result<model::PlaceScan> from_wire(const place_scan_t& wire) {
 
 place_scan_t to_wire(const model::PlaceScan& scan) {
   place_scan_t wire{};
-  wire.utime = scan.utime;
-  wire.seq = static_cast<std::int64_t>(scan.sequence);
+  put_stamp(scan, wire);
   wire.num_points = static_cast<std::int32_t>(scan.points.size());
   for (const model::PlacePoint& point : scan.points) {
     wire.x_cm.push_back(point.x_cm);

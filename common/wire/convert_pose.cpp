@@ -16,8 +16,7 @@ model::SlamPose slam_pose(const Wire& wire, Checks& checks) {
   checks.range("reset_counter", static_cast<double>(wire.reset_counter), 0.0, 9.3e18);
 
   model::SlamPose pose;
-  pose.utime = wire.utime;
-  pose.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, pose);
   if (wire.keyframe_seq >= 0)
     pose.keyframe_sequence = static_cast<std::uint64_t>(wire.keyframe_seq);
   pose.submap_id = static_cast<std::uint64_t>(wire.submap_id);
@@ -64,8 +63,7 @@ Result<model::SlamPose> from_wire(const slam_pose2_t& wire) {
   copy_status(wire.status, pose);
   pose.map_id = static_cast<std::uint32_t>(wire.map_id);
   pose.is_provisional = wire.provisional != 0;
-  if (checks.refusal()) return *checks.refusal();
-  return pose;
+  return checks.result(pose);
 }
 
 Result<model::SlamPose> from_wire(const slam_pose_t& wire) {
@@ -73,14 +71,12 @@ Result<model::SlamPose> from_wire(const slam_pose_t& wire) {
   checks.range("status", wire.status, slam_pose_t::FIRST_MAP, slam_pose_t::COASTING);
   model::SlamPose pose = slam_pose(wire, checks);
   copy_status(wire.status, pose);
-  if (checks.refusal()) return *checks.refusal();
-  return pose;
+  return checks.result(pose);
 }
 
 slam_pose2_t to_wire(const model::SlamPose& pose) {
   slam_pose2_t wire{};
-  wire.utime = pose.utime;
-  wire.seq = static_cast<std::int64_t>(pose.sequence);
+  put_stamp(pose, wire);
   wire.status = status_of(pose);
   wire.provisional = pose.is_provisional ? 1 : 0;
   wire.keyframe_seq =

@@ -96,8 +96,7 @@ model::Odometry odometry(const Wire& wire, Checks& checks) {
   checks.pose("from_T_to", wire.from_T_to);
   model::Odometry odometry;
   odometry.from_utime = wire.from_utime;
-  odometry.utime = wire.utime;
-  odometry.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, odometry);
   odometry.from_T_to = from_wire(wire.from_T_to);
   odometry.covariance = checks.covariance("covariance", wire.covariance);
   odometry.has_wheels = wire.has_wheels != 0;
@@ -123,22 +122,19 @@ geometry::SE2 from_wire(const pose2_t& pose) { return {pose.x, pose.y, pose.thet
 Result<model::LandmarkScan> from_wire(const landmarks_t& wire) {
   Checks checks;
   model::LandmarkScan scan;
-  scan.utime = wire.utime;
-  scan.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, scan);
   scan.field_of_view = field_of_view(wire, checks);
   scan.detections.reserve(wire.detections.size());
   for (std::size_t i = 0; i < wire.detections.size(); ++i) {
     checks.in("detections", i);
     scan.detections.push_back(detection(wire.detections[i], checks));
   }
-  if (checks.refusal()) return *checks.refusal();
-  return scan;
+  return checks.result(scan);
 }
 
 landmarks_t to_wire(const model::LandmarkScan& scan) {
   landmarks_t wire{};
-  wire.utime = scan.utime;
-  wire.seq = static_cast<std::int64_t>(scan.sequence);
+  put_stamp(scan, wire);
   copy_field_of_view(scan.field_of_view, wire);
   wire.num_detections = static_cast<std::int32_t>(scan.detections.size());
   wire.detections.reserve(scan.detections.size());
@@ -151,8 +147,7 @@ landmarks_t to_wire(const model::LandmarkScan& scan) {
 Result<model::Odometry> from_wire(const odometry_t& wire) {
   Checks checks;
   model::Odometry value = odometry(wire, checks);
-  if (checks.refusal()) return *checks.refusal();
-  return value;
+  return checks.result(value);
 }
 
 Result<model::Odometry> from_wire(const odometry2_t& wire) {
@@ -161,14 +156,12 @@ Result<model::Odometry> from_wire(const odometry2_t& wire) {
   checks.consistent(wire.num_level == wire.num_inertial, "num_level = num_inertial");
   if (checks.refusal()) return *checks.refusal();
   if (value.inertial) value.inertial->level = level_error(wire.level[0], checks);
-  if (checks.refusal()) return *checks.refusal();
-  return value;
+  return checks.result(value);
 }
 
 odometry2_t to_wire(const model::Odometry& odometry) {
   odometry2_t wire{};
-  wire.utime = odometry.utime;
-  wire.seq = static_cast<std::int64_t>(odometry.sequence);
+  put_stamp(odometry, wire);
   wire.from_utime = odometry.from_utime;
   wire.from_T_to = to_wire(odometry.from_T_to);
   copy_matrix(odometry.covariance, wire.covariance);
@@ -199,8 +192,7 @@ Result<model::PlanarScan> from_wire(const lidar_scan_t& wire) {
 
   if (checks.refusal()) return *checks.refusal();
   model::PlanarScan scan;
-  scan.utime = wire.utime;
-  scan.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, scan);
   scan.first_bearing_rad = wire.start_angle_rad;
   scan.bearing_step_rad = wire.angle_step_rad;
   scan.max_range_m = wire.max_range_m;
@@ -212,8 +204,7 @@ Result<model::PlanarScan> from_wire(const lidar_scan_t& wire) {
 
 lidar_scan_t to_wire(const model::PlanarScan& scan) {
   lidar_scan_t wire{};
-  wire.utime = scan.utime;
-  wire.seq = static_cast<std::int64_t>(scan.sequence);
+  put_stamp(scan, wire);
   wire.start_angle_rad = scan.first_bearing_rad;
   wire.angle_step_rad = scan.bearing_step_rad;
   wire.max_range_m = scan.max_range_m;
@@ -233,8 +224,7 @@ Result<model::WheelSample> from_wire(const wheels_t& wire) {
   checks.range("steering_rad", wire.steering_rad, -std::numbers::pi, std::numbers::pi);
   if (checks.refusal()) return *checks.refusal();
   model::WheelSample sample;
-  sample.utime = wire.utime;
-  sample.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, sample);
   sample.speed_mps = wire.speed_m_s;
   sample.steering_rad = wire.steering_rad;
   return sample;
@@ -242,8 +232,7 @@ Result<model::WheelSample> from_wire(const wheels_t& wire) {
 
 wheels_t to_wire(const model::WheelSample& sample) {
   wheels_t wire{};
-  wire.utime = sample.utime;
-  wire.seq = static_cast<std::int64_t>(sample.sequence);
+  put_stamp(sample, wire);
   wire.speed_m_s = sample.speed_mps;
   wire.steering_rad = sample.steering_rad;
   return wire;
@@ -257,8 +246,7 @@ Result<model::ImuSample> from_wire(const imu_t& wire) {
   }
   if (checks.refusal()) return *checks.refusal();
   model::ImuSample sample;
-  sample.utime = wire.utime;
-  sample.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, sample);
   sample.angular_rate_rad_s = Eigen::Map<const Eigen::Vector3d>(wire.angular_rate_rad_s);
   sample.specific_force_mps2 = Eigen::Map<const Eigen::Vector3d>(wire.specific_force_m_s2);
   return sample;
@@ -266,8 +254,7 @@ Result<model::ImuSample> from_wire(const imu_t& wire) {
 
 imu_t to_wire(const model::ImuSample& sample) {
   imu_t wire{};
-  wire.utime = sample.utime;
-  wire.seq = static_cast<std::int64_t>(sample.sequence);
+  put_stamp(sample, wire);
   copy_vector(sample.angular_rate_rad_s, wire.angular_rate_rad_s);
   copy_vector(sample.specific_force_mps2, wire.specific_force_m_s2);
   return wire;
@@ -276,8 +263,7 @@ imu_t to_wire(const model::ImuSample& sample) {
 Result<model::TrackedScan> from_wire(const tracked_landmarks_t& wire) {
   Checks checks;
   model::TrackedScan scan;
-  scan.utime = wire.utime;
-  scan.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, scan);
   scan.field_of_view = field_of_view(wire, checks);
   scan.landmarks.reserve(wire.landmarks.size());
 
@@ -290,15 +276,12 @@ Result<model::TrackedScan> from_wire(const tracked_landmarks_t& wire) {
                               static_cast<std::uint32_t>(from.detection),
                               detection(from.observed, checks)});
   }
-
-  if (checks.refusal()) return *checks.refusal();
-  return scan;
+  return checks.result(scan);
 }
 
 tracked_landmarks_t to_wire(const model::TrackedScan& scan) {
   tracked_landmarks_t wire{};
-  wire.utime = scan.utime;
-  wire.seq = static_cast<std::int64_t>(scan.sequence);
+  put_stamp(scan, wire);
   copy_field_of_view(scan.field_of_view, wire);
   wire.num_landmarks = static_cast<std::int32_t>(scan.landmarks.size());
   wire.landmarks.reserve(scan.landmarks.size());
@@ -326,8 +309,7 @@ Result<model::GnssFix> from_wire(const gnss_t& wire) {
   if (checks.refusal()) return *checks.refusal();
 
   model::GnssFix fix;
-  fix.utime = wire.utime;
-  fix.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, fix);
   fix.east_north_m = {wire.east_m, wire.north_m};
   fix.sigma_m = wire.sigma_m;
 
@@ -341,8 +323,7 @@ Result<model::GnssFix> from_wire(const gnss_t& wire) {
 
 gnss_t to_wire(const model::GnssFix& fix) {
   gnss_t wire{};
-  wire.utime = fix.utime;
-  wire.seq = static_cast<std::int64_t>(fix.sequence);
+  put_stamp(fix, wire);
   wire.valid = 1;
   wire.east_m = fix.east_north_m.x();
   wire.north_m = fix.east_north_m.y();

@@ -25,6 +25,19 @@ inline constexpr double kMostDetections = 1e9;
 /// Ids of maps are positive in the 16 bit that a landmark's id has for its map.
 inline constexpr double kMostMaps = 0x7fff;
 
+/// Stamp and number of a message.
+template <class Wire, class Value>
+void take_stamp(const Wire& wire, Value& value) {
+  value.utime = wire.utime;
+  value.sequence = static_cast<std::uint64_t>(wire.seq);
+}
+/// The opposite.
+template <class Value, class Wire>
+void put_stamp(const Value& value, Wire& wire) {
+  wire.utime = value.utime;
+  wire.seq = static_cast<std::int64_t>(value.sequence);
+}
+
 /// Into the rows of a wire type.
 template <int N>
 void copy_matrix(const Eigen::Matrix<double, N, N>& matrix, SquareArray<N>& rows) {

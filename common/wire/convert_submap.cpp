@@ -46,8 +46,7 @@ loop_end_t to_wire(const model::LoopEnd& end) {
 Result<model::Submap> from_wire(const submap_t& wire) {
   Checks checks;
   model::Submap submap;
-  submap.utime = wire.utime;
-  submap.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, submap);
   submap.map_id = map_number(wire.map_id, checks);
   submap.id = number("submap_id", wire.submap_id, checks);
   submap.replaced = submap_ids("replaced", wire.replaced, checks);
@@ -61,14 +60,12 @@ Result<model::Submap> from_wire(const submap_t& wire) {
   submap.content_hash = static_cast<std::uint64_t>(wire.content_hash);
   checks.consistent(model::fnv1a(submap.payload) == submap.content_hash,
                     "content_hash is the payload's");
-  if (checks.refusal()) return *checks.refusal();
-  return submap;
+  return checks.result(submap);
 }
 
 submap_t to_wire(const model::Submap& submap) {
   submap_t wire{};
-  wire.utime = submap.utime;
-  wire.seq = static_cast<std::int64_t>(submap.sequence);
+  put_stamp(submap, wire);
   wire.map_id = static_cast<std::int32_t>(submap.map_id);
   wire.submap_id = static_cast<std::int64_t>(submap.id);
   wire.content_hash = static_cast<std::int64_t>(submap.content_hash);
@@ -87,19 +84,16 @@ submap_t to_wire(const model::Submap& submap) {
 Result<model::SubmapStored> from_wire(const submap_stored_t& wire) {
   Checks checks;
   model::SubmapStored stored;
-  stored.utime = wire.utime;
-  stored.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, stored);
   stored.map_id = map_number(wire.map_id, checks);
   stored.id = number("submap_id", wire.submap_id, checks);
   stored.content_hash = static_cast<std::uint64_t>(wire.content_hash);
-  if (checks.refusal()) return *checks.refusal();
-  return stored;
+  return checks.result(stored);
 }
 
 submap_stored_t to_wire(const model::SubmapStored& stored) {
   submap_stored_t wire{};
-  wire.utime = stored.utime;
-  wire.seq = static_cast<std::int64_t>(stored.sequence);
+  put_stamp(stored, wire);
   wire.map_id = static_cast<std::int32_t>(stored.map_id);
   wire.submap_id = static_cast<std::int64_t>(stored.id);
   wire.content_hash = static_cast<std::int64_t>(stored.content_hash);
@@ -109,18 +103,15 @@ submap_stored_t to_wire(const model::SubmapStored& stored) {
 Result<model::SubmapQuery> from_wire(const submap_query_t& wire) {
   Checks checks;
   model::SubmapQuery query;
-  query.utime = wire.utime;
-  query.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, query);
   query.map_id = map_number(wire.map_id, checks);
   query.ids = submap_ids("submap_ids", wire.submap_ids, checks);
-  if (checks.refusal()) return *checks.refusal();
-  return query;
+  return checks.result(query);
 }
 
 submap_query_t to_wire(const model::SubmapQuery& query) {
   submap_query_t wire{};
-  wire.utime = query.utime;
-  wire.seq = static_cast<std::int64_t>(query.sequence);
+  put_stamp(query, wire);
   wire.map_id = static_cast<std::int32_t>(query.map_id);
   wire.submap_ids.assign(query.ids.begin(), query.ids.end());
   wire.num_submaps = static_cast<std::int32_t>(wire.submap_ids.size());
@@ -130,8 +121,7 @@ submap_query_t to_wire(const model::SubmapQuery& query) {
 Result<model::MapCorrection> from_wire(const map_correction_t& wire) {
   Checks checks;
   model::MapCorrection correction;
-  correction.utime = wire.utime;
-  correction.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, correction);
   correction.map_id = map_number(wire.map_id, checks);
   correction.version = number("version", wire.version, checks);
   correction.submaps.reserve(wire.submaps.size());
@@ -144,15 +134,12 @@ Result<model::MapCorrection> from_wire(const map_correction_t& wire) {
     checks.consistent(i == 0 || correction.submaps[i - 1].id < correction.submaps[i].id,
                       "submaps are in order of submap_id");
   }
-
-  if (checks.refusal()) return *checks.refusal();
-  return correction;
+  return checks.result(correction);
 }
 
 map_correction_t to_wire(const model::MapCorrection& correction) {
   map_correction_t wire{};
-  wire.utime = correction.utime;
-  wire.seq = static_cast<std::int64_t>(correction.sequence);
+  put_stamp(correction, wire);
   wire.map_id = static_cast<std::int32_t>(correction.map_id);
   wire.version = static_cast<std::int64_t>(correction.version);
   wire.submaps.reserve(correction.submaps.size());
@@ -168,8 +155,7 @@ map_correction_t to_wire(const model::MapCorrection& correction) {
 Result<model::LoopClosure> from_wire(const loop_closure2_t& wire) {
   Checks checks;
   model::LoopClosure closure;
-  closure.utime = wire.utime;
-  closure.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, closure);
   closure.map_id = map_number(wire.map_id, checks);
   closure.id = number("closure_id", wire.closure_id, checks);
   closure.source = wire.source;
@@ -185,9 +171,7 @@ Result<model::LoopClosure> from_wire(const loop_closure2_t& wire) {
     checks.range("log10_false_alarm", wire.log10_false_alarm, -1e9, 0.0);
     closure.log10_false_alarm = wire.log10_false_alarm;
   }
-
-  if (checks.refusal()) return *checks.refusal();
-  return closure;
+  return checks.result(closure);
 }
 
 Result<model::LoopClosure> from_wire(const loop_closure_t& wire) {
@@ -208,8 +192,7 @@ Result<model::LoopClosure> from_wire(const loop_closure_t& wire) {
 
 loop_closure2_t to_wire(const model::LoopClosure& closure) {
   loop_closure2_t wire{};
-  wire.utime = closure.utime;
-  wire.seq = static_cast<std::int64_t>(closure.sequence);
+  put_stamp(closure, wire);
   wire.map_id = static_cast<std::int32_t>(closure.map_id);
   wire.closure_id = static_cast<std::int64_t>(closure.id);
   wire.source = closure.source;
@@ -225,21 +208,18 @@ loop_closure2_t to_wire(const model::LoopClosure& closure) {
 Result<model::LoopResult> from_wire(const loop_result_t& wire) {
   Checks checks;
   model::LoopResult result;
-  result.utime = wire.utime;
-  result.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, result);
   result.map_id = map_number(wire.map_id, checks);
   result.closure_id = number("closure_id", wire.closure_id, checks);
   checks.range("status", wire.status, loop_result_t::ACCEPTED, loop_result_t::REVOKED);
   result.status = static_cast<model::LoopResult::Status>(wire.status);
   result.reason = wire.reason;
-  if (checks.refusal()) return *checks.refusal();
-  return result;
+  return checks.result(result);
 }
 
 loop_result_t to_wire(const model::LoopResult& result) {
   loop_result_t wire{};
-  wire.utime = result.utime;
-  wire.seq = static_cast<std::int64_t>(result.sequence);
+  put_stamp(result, wire);
   wire.map_id = static_cast<std::int32_t>(result.map_id);
   wire.closure_id = static_cast<std::int64_t>(result.closure_id);
   wire.status = static_cast<std::int8_t>(result.status);

@@ -119,8 +119,7 @@ Result<model::PointSweep> from_wire(const lidar_sweep_t& wire) {
   Checks checks;
   check_counts(wire, checks);
   model::PointSweep sweep;
-  sweep.utime = wire.utime;
-  sweep.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, sweep);
   sweep.revolution = static_cast<std::uint64_t>(wire.turn);
   sweep.part = static_cast<std::uint16_t>(wire.part);
   sweep.parts = static_cast<std::uint16_t>(wire.parts);
@@ -132,15 +131,12 @@ Result<model::PointSweep> from_wire(const lidar_sweep_t& wire) {
   if (wire.has_attitude != 0) sweep.attitude = attitude(wire, checks);
 
   copy_points(wire, checks, sweep.points);
-  if (checks.refusal()) return *checks.refusal();
-
-  return sweep;
+  return checks.result(sweep);
 }
 
 lidar_sweep_t to_wire(const model::PointSweep& sweep) {
   lidar_sweep_t wire{};
-  wire.utime = sweep.utime;
-  wire.seq = static_cast<std::int64_t>(sweep.sequence);
+  put_stamp(sweep, wire);
   wire.turn = static_cast<std::int64_t>(sweep.revolution);
   wire.part = sweep.part;
   wire.parts = sweep.parts;

@@ -150,8 +150,7 @@ Result<model::MapUpdate> update_with_detections(const Wire& wire) {
   update.scans = scans(wire, checks);
   update.detections = identified(wire, checks);
   update.expected = expected(wire, checks);
-  if (checks.refusal()) return *checks.refusal();
-  return update;
+  return checks.result(update);
 }
 
 }  // namespace
@@ -167,8 +166,7 @@ Result<model::MapUpdate> from_wire(const slam_update2_t& wire) {
 Result<model::MapUpdate> from_wire(const slam_update_t& wire) {
   Checks checks;
   model::MapUpdate update = map_update(wire, checks);
-  if (checks.refusal()) return *checks.refusal();
-  return update;
+  return checks.result(update);
 }
 
 slam_update3_t to_wire(const model::MapUpdate& update) {

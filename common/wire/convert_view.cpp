@@ -32,8 +32,7 @@ Result<model::ViewRanges> from_wire(const view_ranges_t& wire) {
   check_bins(wire, checks);
   if (checks.refusal()) return *checks.refusal();
   model::ViewRanges ranges;
-  ranges.utime = wire.utime;
-  ranges.sequence = static_cast<std::uint64_t>(wire.seq);
+  take_stamp(wire, ranges);
   ranges.sensor_m = Eigen::Map<const Eigen::Vector2d>(wire.sensor_m);
   ranges.turn_m = Eigen::Map<const Eigen::Vector2d>(wire.turn_m);
   ranges.first_bearing_rad = wire.first_bearing_rad;
@@ -47,8 +46,7 @@ Result<model::ViewRanges> from_wire(const view_ranges_t& wire) {
 
 view_ranges_t to_wire(const model::ViewRanges& ranges) {
   view_ranges_t wire{};
-  wire.utime = ranges.utime;
-  wire.seq = static_cast<std::int64_t>(ranges.sequence);
+  put_stamp(ranges, wire);
   copy_vector(ranges.sensor_m, wire.sensor_m);
   copy_vector(ranges.turn_m, wire.turn_m);
   wire.first_bearing_rad = ranges.first_bearing_rad;
