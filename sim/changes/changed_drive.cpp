@@ -95,11 +95,6 @@ void count_sights(std::span<const CameraFrame> frames, std::vector<TruePoint>& p
 std::string_view to_string(PointState state) {
   return kPointStateNames[static_cast<std::size_t>(state)];
 }
-std::optional<PointState> point_state(std::string_view name) {
-  const auto* const found = std::find(kPointStateNames.begin(), kPointStateNames.end(), name);
-  if (found == kPointStateNames.end()) return std::nullopt;
-  return static_cast<PointState>(found - kPointStateNames.begin());
-}
 
 const TruePoint* ChangedDrive::find(PointId id) const {
   const auto found =

@@ -25,8 +25,6 @@ enum class PointState : std::uint8_t {
 };
 /// "present", "gone", "moved", "new", "newly_hidden".
 std::string_view to_string(PointState state);
-/// The state with this name; none for another.
-std::optional<PointState> point_state(std::string_view name);
 
 /// Truth of a point.
 struct TruePoint {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -10,7 +9,6 @@
 
 #include "common/io/data_error.hpp"
 #include "common/io/output_file.hpp"
-#include "common/io/text_file.hpp"
 #include "sim/changes/drive_tables.hpp"
 
 namespace understory::sim::changes {
@@ -83,34 +81,6 @@ Json json_of(const CameraParameters& c) {
           {"flip_rate", c.flip_rate},
           {"flip_rate_oblique", c.flip_rate_oblique},
           {"body_T_camera", rotation}};
-}
-
-CameraParameters camera_of(const Json& json) {
-  CameraParameters c;
-  json.at("width_px").get_to(c.width_px);
-  json.at("height_px").get_to(c.height_px);
-  json.at("focal_px").get_to(c.focal_px);
-  json.at("baseline_m").get_to(c.baseline_m);
-  json.at("rate_hz").get_to(c.rate_hz);
-  json.at("near_m").get_to(c.near_m);
-  json.at("far_m").get_to(c.far_m);
-  json.at("most_oblique_rad").get_to(c.most_oblique_rad);
-
-  json.at("recall").get_to(c.recall);
-  json.at("recall_loss_far").get_to(c.recall_loss_far);
-  json.at("false_per_frame").get_to(c.false_per_frame);
-  json.at("pixel_sigma").get_to(c.pixel_sigma);
-  json.at("disparity_sigma").get_to(c.disparity_sigma);
-  json.at("flip_rate").get_to(c.flip_rate);
-  json.at("flip_rate_oblique").get_to(c.flip_rate_oblique);
-  for (int row = 0; row < 4; ++row) {
-    for (int column = 0; column < 4; ++column)
-      c.body_T_camera.matrix()(row, column) = json.at("body_T_camera")
-                                                  .at(static_cast<std::size_t>(row))
-                                                  .at(static_cast<std::size_t>(column))
-                                                  .get<double>();
-  }
-  return c;
 }
 
 std::string copy_name(int copy) { return fmt::format("copy_{}", copy); }
@@ -206,57 +176,6 @@ void DataSetWriter::commit() {
                       {"files", files}};
   io::write_whole_file(folder_ / kManifestName, manifest.dump(2) + "\n");
   is_whole_ = true;
-}
-
-DataSetReader::DataSetReader(std::filesystem::path folder) : folder_(std::move(folder)) {
-  const std::filesystem::path file = folder_ / kManifestName;
-  const std::string text = io::read_whole_file(file);
-  const auto refuse = [&](const std::string& why) {
-    throw io::DataError(fmt::format("{}: {}", file.string(), why));
-  };
-
-  try {
-    const Json json = Json::parse(text);
-    if (json.at("format") != kFormatName || json.at("version") != kFormatVersion)
-      refuse(fmt::format("not '{}', version {}", kFormatName, kFormatVersion));
-    const auto scene = scene_kind(json.at("world").get<std::string>());
-    if (!scene) refuse("world: no such world");
-    info_.scene = scene.value_or(SceneKind::kOffice);
-    json.at("seed").get_to(info_.seed);
-    json.at("copies").get_to(copies_);
-    json.at("share_changed").get_to(info_.share);
-    json.at("move_m").get_to(info_.move_m);
-    info_.camera = camera_of(json.at("camera"));
-    for (const Json& entry : json.at("files"))
-      files_.push_back(
-          {entry.at("name").get<std::string>(), entry.at("bytes").get<std::uint64_t>()});
-  } catch (const Json::exception& error) {
-    refuse(error.what());
-  }
-}
-
-std::filesystem::path DataSetReader::whole_file(int copy, std::string_view name) const {
-  const std::string full = fmt::format("{}/{}", copy_name(copy), name);
-  const auto entry = std::find_if(files_.begin(), files_.end(),
-                                  [&](const DataSetFile& file) { return file.name == full; });
-  if (entry == files_.end())
-    throw io::DataError(fmt::format("{}: has no {}", (folder_ / kManifestName).string(), full));
-  std::filesystem::path path = folder_ / full;
-  const std::uint64_t bytes = size_of(path);
-  if (bytes != entry->bytes)
-    throw io::DataError(
-        fmt::format("{}: {} bytes, the manifest says {}", path.string(), bytes, entry->bytes));
-  return path;
-}
-
-ChangedDrive DataSetReader::drive(int copy) const {
-  const auto read = [&](std::string_view name) {
-    const std::filesystem::path path = whole_file(copy, name);
-    return DriveTexts::Text{io::read_whole_file(path), path.string()};
-  };
-  return parse_drive({read("poses.csv"), read("keypoints.csv"), read("segmentation.csv"),
-                      read("expected.csv"), read("points.csv"), read("objects.csv")},
-                     info_.camera);
 }
 
 }  // namespace understory::sim::changes

@@ -56,31 +56,6 @@ class DataSetWriter {
   bool is_whole_ = false;
 };
 
-/// Reads a data set.
-class DataSetReader {
- public:
-  /// Reads the manifest. Throws io::DataError if it is missing or invalid.
-  explicit DataSetReader(std::filesystem::path folder);
-
-  /// Its description.
-  const DataSetInfo& info() const { return info_; }
-  /// Number of copies, including the unchanged one.
-  int copies() const { return copies_; }
-  /// All files but the manifest.
-  const std::vector<DataSetFile>& files() const { return files_; }
-  /// The drive of a copy. Throws io::DataError with file and line; a file whose size differs from
-  /// the manifest is refused by its name.
-  ChangedDrive drive(int copy) const;
-  /// A file of a copy, with the size checked against the manifest. Throws io::DataError.
-  std::filesystem::path whole_file(int copy, std::string_view name) const;
-
- private:
-  std::filesystem::path folder_;
-  DataSetInfo info_;
-  int copies_ = 0;
-  std::vector<DataSetFile> files_;
-};
-
 /// A PCD file (0.7, binary) with fields x, y, z and label, the id of the object.
 std::string pcd_of(const std::vector<MappedPoint>& cloud);
 

@@ -238,11 +238,6 @@ Scene changed(const Scene& scene, const Diff& diff) {
 std::string_view to_string(ThingState state) {
   return kStateNames[static_cast<std::size_t>(state)];
 }
-std::optional<ThingState> thing_state(std::string_view name) {
-  const auto* const found = std::find(kStateNames.begin(), kStateNames.end(), name);
-  if (found == kStateNames.end()) return std::nullopt;
-  return static_cast<ThingState>(found - kStateNames.begin());
-}
 
 std::vector<TrueThing> compare(const Scene& before, const Scene& after) {
   std::vector<TrueThing> things;

@@ -63,8 +63,6 @@ Scene changed(const Scene& scene, const Diff& diff);
 enum class ThingState : std::uint8_t { kPresent, kGone, kMoved, kNew };
 /// "present", "gone", "moved", "new".
 std::string_view to_string(ThingState state);
-/// The state with this name; none for another.
-std::optional<ThingState> thing_state(std::string_view name);
 
 /// A thing of either copy.
 struct TrueThing {

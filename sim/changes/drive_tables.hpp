@@ -1,11 +1,8 @@
-// A changed drive as tables of text, and back. Values are read back exactly, except for the last
-// digit of a rotation.
+// A changed drive as tables of text. Each number has the digits that give it back as it was.
 #pragma once
 
 #include <span>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "sim/changes/changed_drive.hpp"
 
@@ -23,17 +20,5 @@ std::string text_of_expected(std::span<const CameraFrame> frames);
 std::string text_of_points(std::span<const TruePoint> points);
 /// Truth of all things.
 std::string text_of_things(std::span<const TrueThing> things);
-
-/// The texts of one drive; errors contain the `source` of each.
-struct DriveTexts {
-  struct Text {
-    std::string text;
-    std::string source;
-  };
-  Text poses, keypoints, segmentation, expected, points, things;
-};
-/// The drive from its texts. Throws io::DataError with file and line for any error: headings,
-/// numbers, names, stamps without a frame, rows out of order, tables that disagree.
-ChangedDrive parse_drive(const DriveTexts& texts, const CameraParameters& camera);
 
 }  // namespace understory::sim::changes

@@ -60,11 +60,6 @@ Descriptor with_noise(Descriptor descriptor, double rate, std::uint64_t key) {
 }  // namespace
 
 std::string_view to_string(Sight sight) { return kSightNames[static_cast<std::size_t>(sight)]; }
-std::optional<Sight> sight_of_name(std::string_view name) {
-  const auto* const found = std::find(kSightNames.begin(), kSightNames.end(), name);
-  if (found == kSightNames.end()) return std::nullopt;
-  return static_cast<Sight>(found - kSightNames.begin());
-}
 
 Eigen::Isometry3d CameraParameters::looking_ahead(const Eigen::Vector3d& position_m) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();

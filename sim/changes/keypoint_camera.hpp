@@ -73,8 +73,6 @@ enum class Sight : std::uint8_t {
 
 /// "visible", "hidden", "newly_hidden", "gone", "new".
 std::string_view to_string(Sight sight);
-/// The sight with this name; none for another.
-std::optional<Sight> sight_of_name(std::string_view name);
 
 /// Truth of one point for one frame. A moved point may be listed twice: kGone at the old place and
 /// kNew at the present one.

@@ -78,9 +78,6 @@ struct PartMover {
 }  // namespace
 
 std::string_view to_string(ThingKind kind) { return kThingNames[static_cast<std::size_t>(kind)]; }
-std::optional<ThingKind> thing_kind(std::string_view name) {
-  return kind_of_name<ThingKind>(kThingNames, name);
-}
 std::string_view to_string(SceneKind kind) { return kSceneNames[static_cast<std::size_t>(kind)]; }
 std::optional<SceneKind> scene_kind(std::string_view name) {
   return kind_of_name<SceneKind>(kSceneNames, name);

@@ -35,8 +35,6 @@ enum class ThingKind : std::uint8_t {
 };
 /// The name in files, e.g. "tree".
 std::string_view to_string(ThingKind kind);
-/// The kind with this name; none for another.
-std::optional<ThingKind> thing_kind(std::string_view name);
 
 /// A tree for plant_tree(); its shape follows from its thing's id.
 struct Tree {
