@@ -51,7 +51,6 @@ class Converter::Impl {
     return out_.made(id, map_utime_, scene_.whole(map_utime_));
   }
 
-  Outbox& outbox() { return out_; }
   const LandmarkScene& scene() const { return scene_; }
   std::uint64_t refused() const { return refused_; }
 
@@ -120,50 +119,46 @@ class Converter::Impl {
 bool Converter::Impl::on(const model::SlamPose& pose) {
   if (is_usable(pose)) {
     frames_.take(pose);
-    out_.give(TopicId::kTransforms, pose.utime,
-              [&] { return frame_transforms(pose.utime, frames_.links()); });
+    out_.give(TopicId::kTransforms, pose.utime, frame_transforms(pose.utime, frames_.links()));
     out_.give(TopicId::kPose, pose.utime,
-              [&] { return pose_in_frame(pose.utime, kMapFrame, pose.map_T_vehicle()); });
+              pose_in_frame(pose.utime, kMapFrame, pose.map_T_vehicle()));
     give_path(pose);
   }
-  out_.give(TopicId::kPoseNumbers, pose.utime, [&] { return to_json(numbers_of(pose)); });
+  out_.give(TopicId::kPoseNumbers, pose.utime, to_json(numbers_of(pose)));
   return true;
 }
 
 bool Converter::Impl::on(const model::MapUpdate& update) {
   scene_.take(update);
-  out_.give(TopicId::kUpdateNumbers, update.utime, [&] { return to_json(update); });
+  out_.give(TopicId::kUpdateNumbers, update.utime, to_json(update));
   return true;
 }
 
 bool Converter::Impl::on(const model::WholeMap& map) {
   change_scene(map);
-  out_.give(TopicId::kKeyframes, map.utime, [&] {
-    return poses_in_frame(map.utime, kMapFrame, thinned(map.keyframes, limits_.path_poses));
-  });
+  out_.give(TopicId::kKeyframes, map.utime,
+            poses_in_frame(map.utime, kMapFrame, thinned(map.keyframes, limits_.path_poses)));
   return true;
 }
 
 bool Converter::Impl::on(const model::Existence& existence) {
   change_scene(existence);
-  out_.give(TopicId::kExistenceNumbers, existence.utime, [&] { return to_json(existence); });
+  out_.give(TopicId::kExistenceNumbers, existence.utime, to_json(existence));
   return true;
 }
 
 bool Converter::Impl::on(const model::PointSweep& part) {
-  if (!out_.is_wanted(TopicId::kSweep)) return true;
   const auto sweep = sweeps_.add(part);
   if (!sweep) return true;
-  out_.give(TopicId::kSweep, sweep->utime,
-            [&] { return point_cloud(*sweep, limits_.sweep_points); });
+  out_.give(TopicId::kSweep, sweep->utime, point_cloud(*sweep, limits_.sweep_points));
   return true;
 }
 
 bool Converter::Impl::on(const model::EkfPose& pose) {
   frames_.take(pose);
   out_.give(TopicId::kFilterPose, pose.utime,
-            [&] { return pose_in_frame(pose.utime, "ekf_map", pose.ekf_map_T_vehicle); });
-  out_.give(TopicId::kFilterNumbers, pose.utime, [&] { return to_json(pose); });
+            pose_in_frame(pose.utime, "ekf_map", pose.ekf_map_T_vehicle));
+  out_.give(TopicId::kFilterNumbers, pose.utime, to_json(pose));
   return true;
 }
 
@@ -173,8 +168,7 @@ bool Converter::Impl::on(const ground_truth_t& truth) {
   if (checks.refusal()) return false;
   const geometry::SE2 world_T_vehicle = wire::from_wire(truth.world_T_vehicle);
   frames_.take_truth(truth.utime, world_T_vehicle);
-  out_.give(TopicId::kTruth, truth.utime,
-            [&] { return pose_in_frame(truth.utime, "world", world_T_vehicle); });
+  out_.give(TopicId::kTruth, truth.utime, pose_in_frame(truth.utime, "world", world_T_vehicle));
   return true;
 }
 
@@ -183,7 +177,7 @@ bool Converter::Impl::change_scene(const Message& message) {
   scene_.take(message);
   map_utime_ = std::max(map_utime_, message.utime);
   if (!scene_.has_changed()) return true;
-  out_.give(TopicId::kLandmarks, message.utime, [&] { return scene_.update(map_utime_); });
+  out_.give(TopicId::kLandmarks, message.utime, scene_.update(map_utime_));
   scene_.skip_update();
   return true;
 }
@@ -194,8 +188,7 @@ void Converter::Impl::give_path(const model::SlamPose& pose) {
   const bool is_early = since >= 0 && since < limits_.path_us && path_.poses().size() > 1;
   if (is_early) return;
   path_utime_ = pose.utime;
-  out_.give(TopicId::kPath, pose.utime,
-            [&] { return poses_in_frame(pose.utime, kMapFrame, path_.poses()); });
+  out_.give(TopicId::kPath, pose.utime, poses_in_frame(pose.utime, kMapFrame, path_.poses()));
 }
 
 PoseNumbers Converter::Impl::numbers_of(const model::SlamPose& pose) const {
@@ -219,9 +212,6 @@ std::vector<Converted> Converter::take(std::string_view channel,
   return impl_->take(channel, bytes, received_utime);
 }
 std::optional<Converted> Converter::state_of(TopicId topic) const { return impl_->state_of(topic); }
-void Converter::set_wanted(TopicId topic, bool is_wanted) {
-  impl_->outbox().set_wanted(topic, is_wanted);
-}
 bool Converter::takes(std::string_view channel) { return Impl::handlers().contains(channel); }
 std::uint64_t Converter::refused() const { return impl_->refused(); }
 std::uint64_t Converter::landmarks_left_out() const { return impl_->scene().left_out(); }

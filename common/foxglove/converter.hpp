@@ -49,9 +49,6 @@ class Converter {
   /// What a client that comes now needs of a topic with state (`Topic::has_state`): the latest
   /// message; of landmarks the whole scene, O(map). None where there is nothing yet.
   std::optional<Converted> state_of(TopicId topic) const;
-  /// Whether messages of a topic are made (at first all are); those with state always are, except
-  /// for the landmarks, whose state is always followed. Saves the work nobody looks at.
-  void set_wanted(TopicId topic, bool is_wanted);
   /// Whether anything is made from messages of this channel.
   static bool takes(std::string_view channel);
   /// Messages that were refused.

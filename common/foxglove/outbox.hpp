@@ -4,6 +4,8 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "common/foxglove/converter.hpp"
@@ -11,24 +13,18 @@
 
 namespace understory::foxglove {
 
-/// Makes messages only where somebody wants them; those of topics with state always.
+/// The messages that the one in hand leads to, and the latest of topics with state.
 class Outbox {
  public:
-  /// At first everything is wanted.
-  Outbox() { wanted_.fill(true); }
-
   /// Begins with another message of the bus, received at `received_utime` [us].
   void begin(std::int64_t received_utime) {
     messages_.clear();
     received_utime_ = received_utime;
   }
-  /// Gives a message of a topic, with the stamp `utime`; `make_json` is called where it is wanted.
-  template <class MakeJson>
-  void give(TopicId id, model::Utime utime, MakeJson make_json) {
-    const auto place = static_cast<std::size_t>(id);
-    if (!wanted_[place] && !keeps(id)) return;
-    messages_.push_back(made(id, utime, make_json()));
-    if (keeps(id)) latest_[place] = messages_.back();
+  /// Gives a message of a topic, with the stamp `utime`.
+  void give(TopicId id, model::Utime utime, std::string json) {
+    messages_.push_back(made(id, utime, std::move(json)));
+    if (keeps(id)) latest_[static_cast<std::size_t>(id)] = messages_.back();
   }
   /// A message that is given to nobody yet.
   Converted made(TopicId id, model::Utime utime, std::string json) const {
@@ -42,10 +38,6 @@ class Outbox {
   const std::optional<Converted>& latest(TopicId id) const {
     return latest_[static_cast<std::size_t>(id)];
   }
-  /// Whether messages of the topic are made.
-  void set_wanted(TopicId id, bool is_wanted) { wanted_[static_cast<std::size_t>(id)] = is_wanted; }
-  /// Whether they are.
-  bool is_wanted(TopicId id) const { return wanted_[static_cast<std::size_t>(id)]; }
   /// When the message in hand was received [us].
   std::int64_t received_utime() const { return received_utime_; }
 
@@ -56,7 +48,6 @@ class Outbox {
 
   std::vector<Converted> messages_;
   std::array<std::optional<Converted>, kTopics> latest_;
-  std::array<bool, kTopics> wanted_{};
   std::int64_t received_utime_ = 0;
 };
 

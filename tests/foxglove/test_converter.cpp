@@ -177,17 +177,5 @@ TEST_CASE("a sweep is whole before it is shown, and thinned") {
   REQUIRE(clouds[0]["data"].get<std::string>().size() == (bytes + 2) / 3 * 4);
 }
 
-TEST_CASE("topics nobody wants are not made, state is kept") {
-  Converter converter;
-  for (const Topic& one : topics()) converter.set_wanted(one.id, false);
-  for (const Converted& one : converted(converter, test::synthetic_drive(60))) {
-    REQUIRE(topic(one.topic).has_state);
-    REQUIRE(one.topic != TopicId::kLandmarks);
-  }
-  REQUIRE(converter.state_of(TopicId::kLandmarks));
-  REQUIRE(converter.state_of(TopicId::kTransforms));
-  REQUIRE_FALSE(converter.state_of(TopicId::kLog));
-}
-
 }  // namespace
 }  // namespace understory::foxglove
