@@ -139,7 +139,8 @@ sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options) {
 }
 
 void SensorPublisher::publish(const sim::SensorReading& reading) {
-  const auto send = [&](const std::string& channel, const auto& message) {
+  const auto send = [&](const std::string& channel, auto message) {
+    message.utime += utime_of_start_;
     publish_(channel, message.utime, wire::encode_message(message));
   };
 
@@ -160,7 +161,7 @@ void SensorPublisher::publish(const sim::SensorReading& reading) {
   } else if (const auto* sweep = std::get_if<sim::SimulatedSweep>(&reading)) {
     for (model::PointSweep& part : split_sweep(sweep->raw, kPointsPerMessage)) {
       part.sequence = sweep_parts_++;
-      send("RAW_SWEEP", part);
+      send("RAW_SWEEP", std::move(part));
     }
   }
 }
@@ -206,10 +207,12 @@ truth_landmarks_t true_landmarks_on_path(const sim::SensorDrive& drive) {
 }
 
 void send_readings(sim::SensorDrive& drive, const Publish& publish,
-                   const std::function<void(model::Utime)>& wait_until) {
-  const truth_landmarks_t landmarks = true_landmarks_on_path(drive);
+                   const std::function<void(model::Utime)>& wait_until,
+                   model::Utime utime_of_start) {
+  truth_landmarks_t landmarks = true_landmarks_on_path(drive);
+  landmarks.utime = utime_of_start;
   publish("TRUTH_LANDMARKS", landmarks.utime, wire::encode_message(landmarks));
-  SensorPublisher publisher(publish);
+  SensorPublisher publisher(publish, utime_of_start);
   while (const auto reading = drive.next()) {
     terminal::throw_if_interrupted();
     wait_until(complete_at(*reading, drive));

@@ -50,13 +50,15 @@ using Publish =
 /// GROUND_TRUTH.
 class SensorPublisher {
  public:
-  /// Sends through `publish`.
-  explicit SensorPublisher(Publish publish) : publish_(std::move(publish)) {}
+  /// Sends through `publish`. `utime_of_start` is added to the stamps of the readings.
+  explicit SensorPublisher(Publish publish, model::Utime utime_of_start = 0)
+      : publish_(std::move(publish)), utime_of_start_(utime_of_start) {}
   /// Sends one reading.
   void publish(const sim::SensorReading& reading);
 
  private:
   Publish publish_;
+  model::Utime utime_of_start_;
   std::uint64_t sweep_parts_ = 0;
 };
 
@@ -64,10 +66,11 @@ class SensorPublisher {
 model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive);
 
 /// Sends every reading in the order in which real sensors would give it, true landmarks first.
-/// `wait_until` is called before each with the time at which it is complete. Throws
-/// terminal::Interrupted.
+/// `wait_until` is called before each with the time of the drive at which it is complete.
+/// `utime_of_start` is added to the stamps of all messages. Throws terminal::Interrupted.
 void send_readings(sim::SensorDrive& drive, const Publish& publish,
-                   const std::function<void(model::Utime)>& wait_until);
+                   const std::function<void(model::Utime)>& wait_until,
+                   model::Utime utime_of_start = 0);
 /// The whole drive as a log, written whole or not at all. `progress` gets the simulated time [s].
 /// Throws io::LogError, terminal::Interrupted.
 void write_sensor_log(sim::SensorDrive& drive, const std::string& file,

@@ -1,6 +1,7 @@
 // `understory sim`: a simulated drive with ground truth, onto the bus or into a log.
 #include <fmt/format.h>
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -53,7 +54,7 @@ sim::Drive make_drive(SimOptions& options) {
 
 /// The trunks that may be detected on the path: no map of the drive can hold others (a given map
 /// may), and a whole square kilometre would be a message of half a megabyte.
-truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
+truth_landmarks_t truth_landmarks(const sim::Drive& drive, model::Utime utime_of_start) {
   std::set<std::uint32_t> in_range;
   for (const auto& pose : drive.world_T_vehicle()) {
     const auto near = drive.grid().within(pose.translation(), drive.reach_m());
@@ -61,7 +62,7 @@ truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
   }
 
   truth_landmarks_t message{};
-  message.utime = drive.utime(0);
+  message.utime = utime_of_start;
   for (const auto trunk : in_range) {
     truth_landmark_t landmark{};
     landmark.id = trunk;
@@ -76,12 +77,17 @@ truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
 }
 
 /// Scan k with its truth, and before it the motion up to it where there are wheels.
-void publish_scan(const sim::Drive& drive, std::size_t k, bool wheels, const Publish& publish) {
+void publish_scan(const sim::Drive& drive, std::size_t k, bool wheels, model::Utime utime_of_start,
+                  const Publish& publish) {
   if (wheels && k > 0) {
-    const model::Odometry odometry = drive.odometry(k);
+    model::Odometry odometry = drive.odometry(k);
+    odometry.from_utime += utime_of_start;
+    odometry.utime += utime_of_start;
     publish("ODOMETRY", odometry.utime, wire::encode_message(odometry));
   }
-  const auto simulated = drive.scan(k);
+  sim::SimulatedScan simulated = drive.scan(k);
+  simulated.scan.utime += utime_of_start;
+
   ground_truth_t truth{};
   truth.utime = simulated.scan.utime;
   truth.seq = static_cast<std::int64_t>(k);
@@ -95,10 +101,10 @@ void write_log(const sim::Drive& drive, const SimOptions& options) {
   const Publish publish = [&](const std::string& channel, model::Utime utime,
                               const wire::Bytes& bytes) { writer.write(utime, channel, bytes); };
   terminal::Progress progress("simulating", static_cast<double>(drive.size()));
-  publish("TRUTH_LANDMARKS", drive.utime(0), wire::encode_message(truth_landmarks(drive)));
+  publish("TRUTH_LANDMARKS", 0, wire::encode_message(truth_landmarks(drive, 0)));
   for (std::size_t k = 0; k < drive.size(); ++k) {
     terminal::throw_if_interrupted();
-    publish_scan(drive, k, options.wheels, publish);
+    publish_scan(drive, k, options.wheels, 0, publish);
     progress.update(static_cast<double>(k + 1));
   }
   writer.commit();
@@ -111,12 +117,21 @@ Publish publish_on(bus::Bus& bus) {
   };
 }
 
+/// The stamp of now: a live drive is stamped by the computer's clock as real sensors are, so that
+/// time goes on for processes that run or keep their state when the simulator is started again.
+model::Utime clock_utime() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
 void drive_live(const sim::Drive& drive, const SimOptions& options) {
   const auto bus = bus::make_live_bus(options.lcm_url);
   const Publish publish = publish_on(*bus);
   terminal::Progress progress("driving", static_cast<double>(drive.size()),
                               terminal::Progress::Without::kTenths);
-  publish("TRUTH_LANDMARKS", drive.utime(0), wire::encode_message(truth_landmarks(drive)));
+  const model::Utime utime_of_start = clock_utime();
+  publish("TRUTH_LANDMARKS", utime_of_start,
+          wire::encode_message(truth_landmarks(drive, utime_of_start)));
   const auto start = std::chrono::steady_clock::now();
 
   for (std::size_t k = 0; k < drive.size(); ++k) {
@@ -124,7 +139,7 @@ void drive_live(const sim::Drive& drive, const SimOptions& options) {
     std::this_thread::sleep_until(start +
                                   std::chrono::microseconds(static_cast<std::int64_t>(elapsed_us)));
     terminal::throw_if_interrupted();
-    publish_scan(drive, k, options.wheels, publish);
+    publish_scan(drive, k, options.wheels, utime_of_start, publish);
     progress.update(static_cast<double>(k + 1));
   }
 }
@@ -134,11 +149,12 @@ void send_sensors_live(sim::SensorDrive& drive, const SimOptions& options) {
   terminal::Progress progress("driving", drive.motion().duration_s(),
                               terminal::Progress::Without::kTenths);
   const auto start = std::chrono::steady_clock::now();
-  send_readings(drive, publish_on(*bus), [&](model::Utime complete) {
+  const auto wait_until = [&](model::Utime complete) {
     progress.update(1e-6 * static_cast<double>(complete));
     const auto elapsed_us = static_cast<std::int64_t>(static_cast<double>(complete) / options.rate);
     std::this_thread::sleep_until(start + std::chrono::microseconds(elapsed_us));
-  });
+  };
+  send_readings(drive, publish_on(*bus), wait_until, clock_utime());
 }
 
 void simulate_sensors(SimOptions& options) {

@@ -1,8 +1,13 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <chrono>
 #include <map>
+#include <optional>
 
+#include "common/bus/live_bus.hpp"
 #include "common/wire/convert.hpp"
+#include "deploy/launch/child_process.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
 #include "understory/ground_truth_t.hpp"
@@ -11,6 +16,68 @@
 using namespace understory;
 using namespace understory::test;
 using Catch::Matchers::Contains;
+
+namespace {
+
+model::Utime clock_now() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
+/// Listens to the drives of `understory sim` on a bus of its own.
+class LiveDrives {
+ public:
+  LiveDrives() : bus_(bus::make_live_bus(url_)) {
+    take<ground_truth_t>("GROUND_TRUTH");
+    take<truth_landmarks_t>("TRUTH_LANDMARKS");
+    take<model::LandmarkScan>("LANDMARKS");
+    take<model::ImuSample>("RAW_IMU");
+    take<model::WheelSample>("RAW_WHEELS");
+    take<model::GnssFix>("RAW_GNSS");
+    take<model::PointSweep>("RAW_SWEEP");
+    take<model::PlanarScan>("RAW_SCAN");
+    bus_->subscribe("ODOMETRY", 0, [this](const bus::BusMessage& message) {
+      const auto odometry = wire::decode_message<model::Odometry>(message.bytes);
+      if (!odometry) return;
+      stamps["ODOMETRY"].push_back(odometry->utime);
+      stamps["from_utime"].push_back(odometry->from_utime);
+    });
+  }
+
+  /// One drive from its first message to its last.
+  bool drive(std::vector<std::string> arguments) {
+    stamps.clear();
+    arguments.insert(arguments.begin(), "sim");
+    arguments.insert(arguments.end(), {"--lcm-url", url_});
+    const auto simulator =
+        launch::ChildProcess::start({UNDERSTORY_COMMAND, std::move(arguments), {}});
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    std::optional<launch::Ending> ending;
+    while (!ending && std::chrono::steady_clock::now() < end) {
+      ending = simulator.ended();
+      while (bus_->handle_one(20)) {
+      }
+    }
+    return ending && ending->exit_code == 0 && ending->signal == 0;
+  }
+
+  std::map<std::string, std::vector<model::Utime>> stamps;  ///< By channel.
+
+ private:
+  template <class Message>
+  void take(const std::string& channel) {
+    bus_->subscribe(channel, 0, [this, channel](const bus::BusMessage& message) {
+      const auto value = wire::decode_message<Message>(message.bytes);
+      if (value) stamps[channel].push_back(value->utime);
+    });
+  }
+
+  std::string url_ =
+      "udpm://239.255.76.70:" + std::to_string(21000 + ::getpid() % 20000) + "?ttl=0";
+  std::unique_ptr<bus::Bus> bus_;
+};
+
+}  // namespace
 
 TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit together", "[cli]") {
   const test::TemporaryDirectory directory;
@@ -160,5 +227,49 @@ TEST_CASE("sim takes every number within its limits and none beyond", "[cli]") {
       CHECK_THAT(error_of(one.option, within), Contains("no-such-world.csv"));
     for (const double beyond : {one.least - std::max(1.0, one.least), one.most + 1.0})
       CHECK_THAT(error_of(one.option, beyond), Contains(one.option));
+  }
+}
+
+TEST_CASE("a live drive that is started again goes on in time", "[cli]") {
+  LiveDrives live;
+  model::Utime last = clock_now();
+  for (int run = 0; run < 2; ++run) {
+    REQUIRE(
+        live.drive({"dense", "--length", "4", "--interval", "0.5", "--speed", "2", "--wheels"}));
+    const auto& truth = live.stamps["GROUND_TRUTH"];
+    REQUIRE(truth.size() >= 4);
+    CHECK(truth.front() > last);
+    CHECK(truth.back() <= clock_now());
+    CHECK(live.stamps["LANDMARKS"] == truth);
+    CHECK(live.stamps["TRUTH_LANDMARKS"] == std::vector<model::Utime>{truth.front()});
+
+    // Motions reach from scan to scan.
+    CHECK(live.stamps["from_utime"] == std::vector<model::Utime>(truth.begin(), truth.end() - 1));
+    CHECK(live.stamps["ODOMETRY"] == std::vector<model::Utime>(truth.begin() + 1, truth.end()));
+    last = truth.back();
+  }
+}
+
+TEST_CASE("all sensors of a live drive are stamped by the computer's clock", "[cli]") {
+  LiveDrives live;
+  constexpr model::Utime kLongest_us = 60'000'000;
+  const model::Utime before = clock_now();
+  REQUIRE(live.drive({"countryside", "--distance", "20", "--standstill", "1", "--lidar", "vlp16",
+                      "--planar-laser", "--rate", "4"}));
+  REQUIRE(live.stamps["TRUTH_LANDMARKS"].size() == 1);
+  const model::Utime start = live.stamps["TRUTH_LANDMARKS"].front();
+  CHECK(start >= before);
+  CHECK(start <= clock_now());
+  const model::Utime end = live.stamps["GROUND_TRUTH"].back();
+  CHECK(live.stamps["GROUND_TRUTH"].front() == start);
+  CHECK(end - start < kLongest_us);
+
+  for (const std::string channel : {"RAW_IMU", "RAW_WHEELS", "RAW_GNSS", "RAW_SWEEP", "RAW_SCAN"}) {
+    CAPTURE(channel);
+    REQUIRE(live.stamps[channel].size() > 2);
+    CHECK(live.stamps[channel].front() - start >= 0);
+    CHECK(live.stamps[channel].front() - start < 1'000'000);
+    CHECK(live.stamps[channel].back() <= end + 20'000);  // A period of GROUND_TRUTH.
+    CHECK(live.stamps[channel].back() > end - 1'000'000);
   }
 }
