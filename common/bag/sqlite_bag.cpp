@@ -6,8 +6,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
+#include <initializer_list>
 #include <map>
+#include <new>
 #include <span>
+#include <string_view>
 
 #include "common/io/data_error.hpp"
 #include "common/io/file_window.hpp"
@@ -39,6 +43,35 @@ std::string uri_of(const std::filesystem::path& path) {
   return uri + (none || log == 0 ? "?immutable=1" : "?mode=ro");
 }
 
+/// The command for a file of which only parts can be read.
+std::string recovery_of(const std::string& file) {
+  return fmt::format("'sqlite3 {} .recover | sqlite3 NEW.db3' saves what is left", file);
+}
+
+/// Why SQLite refuses a file, and what helps. `message` is SQLite's own text.
+std::string fault_of(const std::string& file, int code, int system_error,
+                     const std::string& message) {
+  const std::string reason = system_error != 0 ? std::strerror(system_error) : message;
+  switch (code) {
+    case SQLITE_CORRUPT:
+      return fmt::format("damaged ({}): {}", message, recovery_of(file));
+    case SQLITE_NOTADB:
+      return "damaged or encrypted: its header is not that of an SQLite file";
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return "a recorder still has it open: stop the recorder first";
+    case SQLITE_CANTOPEN:
+    case SQLITE_READONLY:
+      return fmt::format(
+          "cannot be opened ({}); with {}-wal beside it, its folder must be writable", reason,
+          file);
+    case SQLITE_IOERR:
+      return fmt::format("the device failed ({}, {})", message, reason);
+    default:
+      return fmt::format("not as rosbag2 writes it ({})", message);
+  }
+}
+
 std::uint32_t big_endian(std::span<const std::uint8_t> bytes) {
   std::uint32_t value = 0;
   for (const std::uint8_t byte : bytes) value = value << 8U | byte;
@@ -57,10 +90,8 @@ void refuse_cut_off(const std::filesystem::path& path) {
   const bool is_count_valid = std::ranges::equal(bytes.subspan(24, 4), bytes.subspan(92, 4));
   const std::uint64_t pages = is_count_valid ? big_endian(bytes.subspan(28, 4)) : 0;
   if (page == 0 || (file.size() % page == 0 && file.size() >= page * pages)) return;
-  throw io::DataError(
-      fmt::format("{0}: cut off at byte {1}: 'sqlite3 {0} .recover | sqlite3 NEW.db3' "
-                  "saves what is left",
-                  path.string(), file.size()));
+  throw io::DataError(fmt::format("{}: cut off at byte {}: {}", path.string(), file.size(),
+                                  recovery_of(path.string())));
 }
 
 }  // namespace
@@ -102,8 +133,27 @@ class SqliteBag::Database {
     return step(statement);
   }
 
+  /// Throws io::DataError where a column of the table is missing.
+  void require(std::string_view table, std::initializer_list<std::string_view> columns) {
+    std::vector<std::string> found;
+    const Statement names = prepare(fmt::format("SELECT name FROM pragma_table_info('{}')", table));
+    while (step(names)) found.push_back(text_at(names.get(), 0));
+    for (const std::string_view column : columns) {
+      if (std::ranges::find(found, column) == found.end())
+        throw io::DataError(
+            fmt::format("{}: no ROS 2 bag: its table {} has no column {}", source_, table, column));
+    }
+  }
+
   [[noreturn]] void refuse() {
-    throw io::DataError(fmt::format("{}: {}", source_, sqlite3_errmsg(file_.get())));
+    // The low byte of an extended code is the kind.
+    const int code = sqlite3_extended_errcode(file_.get()) & 0xFF;
+    if (code == SQLITE_NOMEM) throw std::bad_alloc();
+    // The SQL of a damaged schema comes with its line feeds.
+    std::string message = sqlite3_errmsg(file_.get());
+    std::ranges::replace(message, '\n', ' ');
+    throw io::DataError(fmt::format(
+        "{}: {}", source_, fault_of(source_, code, sqlite3_system_errno(file_.get()), message)));
   }
 
   std::map<std::int64_t, std::size_t> wanted;  ///< Places in topics_ by id in the file.
@@ -124,6 +174,8 @@ SqliteBag::SqliteBag(const std::filesystem::path& path)
     throw io::DataError(source_ +
                         ": an SQLite file without the tables topics and messages of a "
                         "ROS 2 bag");
+  database_->require("topics", {"id", "name", "type", "serialization_format"});
+  database_->require("messages", {"id", "topic_id", "timestamp", "data"});
   std::error_code none;
   const auto journal = std::filesystem::file_size(source_ + "-journal", none);
   if (!none && journal > 0)

@@ -147,7 +147,7 @@ bool is_zstd(Packed bytes) {
 
 std::vector<std::uint8_t> unpack_zstd(Packed packed, std::uint64_t most_bytes) {
   Unpacked out = from_zstd(packed, most_bytes);
-  if (out.fault) throw io::DataError("zstd: " + *out.fault);
+  if (out.fault) throw io::DataError("damaged zstd data: " + *out.fault);
   return std::move(out.bytes);
 }
 

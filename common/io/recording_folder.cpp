@@ -74,12 +74,13 @@ std::string read_entry(const fs::path& path, std::string_view name, const std::s
   zip_stat_t status;
   if (zip_stat_index(archive.get(), *index, 0, &status) != 0 ||
       (status.valid & ZIP_STAT_SIZE) == 0) {
-    throw DataError(fmt::format("{}: {}", what, zip_strerror(archive.get())));
+    throw DataError(fmt::format("{}: damaged archive: {}", what, zip_strerror(archive.get())));
   }
 
   check_size(status.size, what);
   const ZipFile file(zip_fopen_index(archive.get(), *index, 0));
-  if (!file) throw DataError(fmt::format("{}: {}", what, zip_strerror(archive.get())));
+  if (!file)
+    throw DataError(fmt::format("{}: cannot be unpacked: {}", what, zip_strerror(archive.get())));
 
   std::string content(status.size, '\0');
 

@@ -1,4 +1,6 @@
 // Damaged bags give an error that names the file, or what is before the damage.
+#include <sqlite3.h>
+
 #include <algorithm>
 #include <limits>
 #include <random>
@@ -166,6 +168,76 @@ TEST_CASE("bag damage: changed bytes give an error or messages, never a crash") 
     CAPTURE(form.name(), errors);
     if (form.kind == BagForm::Kind::kMcap && form.has_chunks) CHECK(errors > 60);
   }
+}
+
+/// An SQLite file that these statements make.
+class MadeDatabase {
+ public:
+  explicit MadeDatabase(const std::filesystem::path& path) {
+    REQUIRE(sqlite3_open(path.c_str(), &file_) == SQLITE_OK);
+  }
+  ~MadeDatabase() { sqlite3_close(file_); }
+  MadeDatabase(const MadeDatabase&) = delete;
+  MadeDatabase& operator=(const MadeDatabase&) = delete;
+  void run(const std::string& sql) {
+    REQUIRE(sqlite3_exec(file_, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
+  }
+
+ private:
+  sqlite3* file_ = nullptr;
+};
+
+TEST_CASE("bag damage: an SQLite bag that cannot be read says why, and what helps") {
+  const Scratch scratch("bag-sqlite");
+  const auto path = scratch.path() / "run.db3";
+  Random random(6);
+  write_bag(path, {BagForm::Kind::kSqlite}, drive(random, bag::Encoding::kCdr));
+  const std::string whole = file_bytes(path);
+  const auto refused = [&](const std::string& what) {
+    CHECK_THROWS_WITH(bag::open_bag(path), Catch::Matchers::StartsWith(path.string() + ": ") &&
+                                               Catch::Matchers::Contains(what));
+  };
+
+  constexpr std::size_t kPage = 4096;
+  std::string page_lost = whole;
+  page_lost.replace(kPage, kPage, kPage, '\x5A');
+  set_file_bytes(path, page_lost);
+  refused("damaged (database disk image is malformed): 'sqlite3 " + path.string() + " .recover");
+
+  std::string header_lost = whole;
+  header_lost[21] = 0;
+  set_file_bytes(path, header_lost);
+  refused("damaged or encrypted");
+
+  for (const std::string column : {"serialization_format", "topic_id", "timestamp", "data"}) {
+    set_file_bytes(path, whole);
+    MadeDatabase file(path);
+    file.run("DROP INDEX IF EXISTS timestamp_idx");
+    file.run("ALTER TABLE " +
+             std::string(column == "serialization_format" ? "topics" : "messages") +
+             " RENAME COLUMN " + column + " TO other");
+    refused("has no column " + column);
+  }
+}
+
+TEST_CASE("bag damage: an SQLite bag that a recorder has open, or whose log cannot be read") {
+  const Scratch scratch("bag-open");
+  const auto path = scratch.path() / "run.db3";
+  Random random(7);
+  write_bag(path, {BagForm::Kind::kSqlite}, drive(random, bag::Encoding::kCdr));
+  {
+    MadeDatabase recorder(path);
+    recorder.run("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL");
+    recorder.run("DELETE FROM messages WHERE id = 1");
+    CHECK_THROWS_WITH(bag::open_bag(path), Catch::Matchers::Contains("run.db3: a recorder still"));
+    std::filesystem::copy_file(path, scratch.path() / "died.db3");
+    std::filesystem::copy_file(path.string() + "-wal", scratch.path() / "died.db3-wal");
+  }
+  // SQLite makes this file beside a log, which it cannot do in a folder that is read only.
+  std::filesystem::create_symlink("nowhere/shm", scratch.path() / "died.db3-shm");
+  CHECK_THROWS_WITH(bag::open_bag(scratch.path() / "died.db3"),
+                    Catch::Matchers::Contains("died.db3: cannot be opened") &&
+                        Catch::Matchers::Contains("its folder must be writable"));
 }
 
 TEST_CASE("bag damage: times that no clock has") {
