@@ -41,16 +41,9 @@ void drop_joined(std::map<std::uint32_t, LogMaps::Found>& maps) {
 
 void LogMaps::add(const io::LogEvent& event) {
   if (event.channel == "MAP") {
-    const auto whole = wire::decode_message<model::WholeMap>(event.data);
-    if (!whole || !whole->complete) return;
-    go_to(map_id_of(whole->landmarks));
-    held_.take(*whole);
+    if (const auto whole = wire::decode_message<model::WholeMap>(event.data)) on_map(*whole);
   } else if (event.channel == "MAP_DELTA") {
-    const auto delta = wire::decode_message<model::MapDelta>(event.data);
-    if (!delta) return;
-    // Only the first change of a map comes before anything else that names it.
-    if (delta->base_version == 0) go_to(map_id_of(delta->added));
-    held_.take(*delta);
+    if (const auto delta = wire::decode_message<model::MapDelta>(event.data)) on_delta(*delta);
   } else if (event.channel == "SUBMAP") {
     const auto submap = wire::decode_message<model::Submap>(event.data);
     if (submap && submap->map_id == map_id_) held_.take(*submap);
@@ -58,15 +51,26 @@ void LogMaps::add(const io::LogEvent& event) {
     const auto correction = wire::decode_message<model::MapCorrection>(event.data);
     if (correction && correction->map_id == map_id_) held_.take(*correction);
   } else if (event.channel == "SLAM_UPDATE") {
-    const auto update = wire::decode_message<model::MapUpdate>(event.data);
-    if (update) follow(*update);
+    if (const auto update = wire::decode_message<model::MapUpdate>(event.data)) on_update(*update);
   } else if (event.channel == "EXISTENCE_STATE") {
     const auto state = wire::decode_message<model::ExistenceState>(event.data);
     if (state && map_file::fault_of(*state).empty()) existence_.take(*state);
   }
 }
 
-void LogMaps::follow(const model::MapUpdate& update) {
+void LogMaps::on_map(const model::WholeMap& whole) {
+  if (!whole.complete) return;
+  go_to(map_id_of(whole.landmarks));
+  held_.take(whole);
+}
+
+void LogMaps::on_delta(const model::MapDelta& delta) {
+  // Only the first change of a map comes before anything else that names it.
+  if (delta.base_version == 0) go_to(map_id_of(delta.added));
+  held_.take(delta);
+}
+
+void LogMaps::on_update(const model::MapUpdate& update) {
   const bool starts = update.status == model::MapUpdateStatus::kFirstMap;
   // Of a mapper that began anew, the landmarks of this number are others.
   if (starts) existence_.drop_given_by(update.map_id);

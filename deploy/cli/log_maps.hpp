@@ -34,7 +34,9 @@ class LogMaps {
  private:
   void go_to(std::uint32_t map_id);
   void keep();
-  void follow(const model::MapUpdate& update);
+  void on_map(const model::WholeMap& whole);
+  void on_delta(const model::MapDelta& delta);
+  void on_update(const model::MapUpdate& update);
 
   std::uint32_t map_id_ = 0;  ///< Of the map that is held; 0 = none yet.
   bool is_provisional_ = false;

@@ -118,24 +118,33 @@ nlohmann::ordered_json closure_json(const MapCloseOptions& options, const MapToC
           {"change", change == 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(change)}};
 }
 
+MadeClosure make_with_progress(const MapCloseOptions& options, const MapToClose& read,
+                               const SaidClosure& said) {
+  terminal::Progress progress("looking for the same landmarks", 1.0);
+  return make_closure(read, said, options.force, [&](double part) {
+    terminal::throw_if_interrupted();
+    progress.update(part);
+  });
+}
+
+void print_result(const MapCloseOptions& options, const MapToClose& read, const MadeClosure& made,
+                  std::uint64_t change) {
+  if (options.json) {
+    fmt::print("{}\n", result_text(closure_json(options, read, made, change), 2));
+  } else {
+    print_closure(options, read, made, change);
+  }
+}
+
 void run_map_close(const MapCloseOptions& options) {
   terminal::catch_interrupts();
   const SaidClosure said = said_by(options);
+
   try {
     const MapToClose read = read_map_to_close(options.file, options.map_id);
-    const MadeClosure made = [&] {
-      terminal::Progress progress("looking for the same landmarks", 1.0);
-      return make_closure(read, said, options.force, [&](double part) {
-        terminal::throw_if_interrupted();
-        progress.update(part);
-      });
-    }();
+    const MadeClosure made = make_with_progress(options, read, said);
     const std::uint64_t change = options.dry_run ? 0 : write_closure(options, read, made);
-    if (options.json) {
-      fmt::print("{}\n", result_text(closure_json(options, read, made, change), 2));
-    } else {
-      print_closure(options, read, made, change);
-    }
+    print_result(options, read, made, change);
   } catch (const map_closure::ClosureError& error) {
     fail(fmt::format("{}: {}", options.file, error.what()));
   }

@@ -235,6 +235,42 @@ void run_map_import(const MapImportOptions& options) {
   fmt::print("{} -> {}\n", note.text, options.out);
 }
 
+/// Where the coordinates of a table lie.
+void add_place_options(CLI::App& command, MapImportOptions& options) {
+  command
+      .add_option("--origin", options.table.origin,
+                  "Where the map's origin lies in the table's coordinates: EAST,NORTH, or LAT,LON "
+                  "in degrees (default: 0,0; with --crs near the middle of the table)")
+      ->delimiter(',')
+      ->expected(2);
+  command.add_option("--crs", options.table.crs,
+                     "Reference system of the table: EPSG:25832, EPSG:4326, ... Coordinates become "
+                     "metres near the map's origin, and the file says where that lies");
+  command.add_flag("--force", options.table.is_far_allowed,
+                   "Also coordinates more than 1,000 km outside of the area of --crs");
+  command.add_flag("--same-frame", options.same_frame,
+                   "Coordinates are metres in the frame of the maps that --out has (a log: its "
+                   "drive began with one of them)");
+}
+
+/// How the rows of a table become landmarks.
+void add_table_options(CLI::App& command, MapTableOptions& table) {
+  command.add_option(
+      "--columns", table.columns,
+      "Which column is what, where the headings do not say it: "
+      "x=HEADING,y=HEADING (or lat=, lon=),dbh_cm=HEADING,sigma_m=HEADING,kind=HEADING");
+  command
+      .add_option("--sigma-m", table.sigma_m,
+                  "[m] Standard deviation in x and in y where the table has no sigma_m")
+      ->check(CLI::Range(1e-6, 1e3))
+      ->capture_default_str();
+  command
+      .add_option("--near-m", table.near_m,
+                  "[m] Landmarks of the table that are nearer to each other are reported; 0: none")
+      ->check(CLI::Range(0.0, 1e3))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_map_import(CLI::App& map) {
@@ -247,36 +283,8 @@ void add_map_import(CLI::App& map) {
                    "'BHD [cm]' and the like), or an LCM log with the mapper's output")
       ->required();
   command->add_option("--out", options->out, "The map file; made, or added to")->required();
-  command
-      ->add_option("--origin", options->table.origin,
-                   "Where the map's origin lies in the table's coordinates: EAST,NORTH, or LAT,LON "
-                   "in degrees (default: 0,0; with --crs near the middle of the table)")
-      ->delimiter(',')
-      ->expected(2);
-  command->add_option(
-      "--crs", options->table.crs,
-      "Reference system of the table: EPSG:25832, EPSG:4326, ... Coordinates become "
-      "metres near the map's origin, and the file says where that lies");
-  command->add_flag("--force", options->table.is_far_allowed,
-                    "Also coordinates more than 1,000 km outside of the area of --crs");
-  command->add_flag("--same-frame", options->same_frame,
-                    "Coordinates are metres in the frame of the maps that --out has (a log: its "
-                    "drive began with one of them)");
-  command->add_option(
-      "--columns", options->table.columns,
-      "Which column is what, where the headings do not say it: "
-      "x=HEADING,y=HEADING (or lat=, lon=),dbh_cm=HEADING,sigma_m=HEADING,kind=HEADING");
-  command
-      ->add_option("--sigma-m", options->table.sigma_m,
-                   "[m] Standard deviation in x and in y where the table has no sigma_m")
-      ->check(CLI::Range(1e-6, 1e3))
-      ->capture_default_str();
-  command
-      ->add_option("--near-m", options->table.near_m,
-                   "[m] Landmarks of the table that are nearer to each other are reported; 0: "
-                   "none")
-      ->check(CLI::Range(0.0, 1e3))
-      ->capture_default_str();
+  add_place_options(*command, *options);
+  add_table_options(*command, options->table);
   command
       ->add_option("--map", options->table.map_id, "Number of the table's map (default: the next)")
       ->check(CLI::Range(std::uint32_t{1}, map_file::kLastMapId));

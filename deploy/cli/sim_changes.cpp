@@ -115,19 +115,23 @@ void simulate_changes(const ChangesOptions& options) {
   }
 }
 
-void add_diff_options(CLI::App& command, ChangesOptions& options) {
-  command.add_option("--share", options.diff.share, "Of the objects that are removed or moved")
+void add_object_options(CLI::App& command, changes::DiffParameters& diff) {
+  command.add_option("--share", diff.share, "Of the objects that are removed or moved")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--moved", options.diff.moved_share, "Of these, where they can be moved")
+  command.add_option("--moved", diff.moved_share, "Of these, where they can be moved")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--move", options.diff.move_m, "How far they are moved [m]")
+  command.add_option("--move", diff.move_m, "How far they are moved [m]")
       ->check(CLI::Range(0.01, 10.0))
       ->capture_default_str();
-  command.add_option("--added", options.diff.added_share, "New objects per removed one")
+  command.add_option("--added", diff.added_share, "New objects per removed one")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
+}
+
+void add_diff_options(CLI::App& command, ChangesOptions& options) {
+  add_object_options(command, options.diff);
   command
       .add_option("--clear-cut", options.clear_cut,
                   "forest: instead of all these, fell so many neighbours and park a lorry that "

@@ -10,6 +10,17 @@ namespace {
 constexpr double kTruthEvery_m = 0.2;
 constexpr double kRedraw_m = 0.05;
 
+TrackPoint point_in_map(const geometry::SE2& world_T_map, model::Utime utime,
+                        const geometry::SE2& world_T_vehicle) {
+  const geometry::SE2 at = world_T_map.inverse() * world_T_vehicle;
+  return {utime,
+          static_cast<float>(at.x()),
+          static_cast<float>(at.y()),
+          static_cast<float>(at.theta()),
+          0.0F,
+          0};
+}
+
 }  // namespace
 
 void KnownTruth::take(model::Utime utime, const geometry::SE2& world_T_vehicle) {
@@ -76,35 +87,38 @@ std::optional<TruthError> KnownTruth::compare(const model::SlamPose& pose) {
 
 /// Draws the path so far again if the alignment has moved it visibly.
 void KnownTruth::draw(const geometry::SE2& world_T_map, const geometry::SE2& map_T_vehicle) {
-  const auto in_map = [&](const std::pair<model::Utime, geometry::SE2>& one) {
-    const geometry::SE2 at = world_T_map.inverse() * one.second;
-    return TrackPoint{one.first,
-                      static_cast<float>(at.x()),
-                      static_cast<float>(at.y()),
-                      static_cast<float>(at.theta()),
-                      0.0F,
-                      0};
-  };
   const geometry::SE2 shift = drawn_world_T_map_.inverse() * world_T_map;
   const double reach_m = map_T_vehicle.translation().norm();
   const bool is_off = shift.translation().norm() + std::abs(shift.theta()) * reach_m > kRedraw_m;
+
   if (is_off || track_.points().empty()) {
-    drawn_world_T_map_ = world_T_map;
-    std::vector<TrackPoint> points;
-    points.reserve(world_truth_.size());
-    for (const auto& one : world_truth_) points.push_back(in_map(one));
-    track_.replace_from(0, points);
+    draw_whole(world_T_map);
   } else if (world_truth_.back().first > track_.points().back().utime) {
-    const TrackPoint newest = in_map(world_truth_.back());
-    const auto points = track_.points();
-    const bool is_near =
-        points.size() > 1 && std::hypot(points[points.size() - 2].x_m - newest.x_m,
-                                        points[points.size() - 2].y_m - newest.y_m) < kTruthEvery_m;
-    if (is_near) {
-      track_.replace_last(newest);
-    } else {
-      track_.append(newest);
-    }
+    draw_newest(world_T_map);
+  }
+}
+
+void KnownTruth::draw_whole(const geometry::SE2& world_T_map) {
+  drawn_world_T_map_ = world_T_map;
+  std::vector<TrackPoint> points;
+  points.reserve(world_truth_.size());
+  for (const auto& [utime, world_T_vehicle] : world_truth_)
+    points.push_back(point_in_map(world_T_map, utime, world_T_vehicle));
+  track_.replace_from(0, points);
+}
+
+/// In the place of the last point where that is near to the one before it.
+void KnownTruth::draw_newest(const geometry::SE2& world_T_map) {
+  const auto& [utime, world_T_vehicle] = world_truth_.back();
+  const TrackPoint newest = point_in_map(world_T_map, utime, world_T_vehicle);
+  const auto points = track_.points();
+  const bool is_near =
+      points.size() > 1 && std::hypot(points[points.size() - 2].x_m - newest.x_m,
+                                      points[points.size() - 2].y_m - newest.y_m) < kTruthEvery_m;
+  if (is_near) {
+    track_.replace_last(newest);
+  } else {
+    track_.append(newest);
   }
 }
 

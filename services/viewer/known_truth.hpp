@@ -49,6 +49,8 @@ class KnownTruth {
  private:
   std::optional<geometry::SE2> at(model::Utime utime) const;
   void draw(const geometry::SE2& world_T_map, const geometry::SE2& map_T_vehicle);
+  void draw_whole(const geometry::SE2& world_T_map);
+  void draw_newest(const geometry::SE2& world_T_map);
 
   Change* changes_;
   std::vector<std::pair<model::Utime, geometry::SE2>> world_truth_;

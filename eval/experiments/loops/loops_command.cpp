@@ -43,19 +43,14 @@ void parse_blind(const std::string& text, LoopDriveOptions& drive) {
         "--blind {}: two shares of the drive, FROM-TO, 0 <= FROM < TO <= 1, are wanted", text));
 }
 
-nlohmann::json row_of(const LoopDrive& drive, std::uint64_t seed, const LoopScore& score) {
-  return {{"drive", drive.name},
-          {"run_seed", seed},
-          {"frames", drive.scans.size()},
-          {"length_m", drive.length_m},
-          {"odometry_end_m", drive.closing_error_m},
-          {"keyframes", score.keyframes},
-          {"placed", score.placed},
-          {"maps", score.maps},
-          {"in_map", score.in_map},
-          {"error_m", score.error_m},
-          {"ate_m", score.ate_m},
-          {"queries", score.queries},
+nlohmann::json path_json(const LoopScore& score) {
+  return {{"keyframes", score.keyframes}, {"placed", score.placed},        {"maps", score.maps},
+          {"in_map", score.in_map},       {"error_m", score.error_m},      {"ate_m", score.ate_m},
+          {"end_m", score.end_m},         {"online_end_m", score.online_m}};
+}
+
+nlohmann::json closures_json(const LoopScore& score) {
+  return {{"queries", score.queries},
           {"queries_with_match", score.with_match},
           {"queries_without_match", score.without_match},
           {"sent", score.sent},
@@ -65,11 +60,28 @@ nlohmann::json row_of(const LoopDrive& drive, std::uint64_t seed, const LoopScor
           {"wrong_accepted", score.accepted_wrong},
           {"waiting", score.waiting},
           {"refused", score.refused},
-          {"mean_nees", score.mean_nees},
-          {"search_ms_p50", score.search_ms_p50},
+          {"first_accepted_m", score.first_accepted_m},
+          {"largest_off_m", score.largest_off_m},
+          {"mean_nees", score.mean_nees}};
+}
+
+nlohmann::json times_json(const LoopScore& score) {
+  return {{"search_ms_p50", score.search_ms_p50},
           {"search_ms_p99", score.search_ms_p99},
           {"mapper_ms_p99", score.mapper_ms_p99},
           {"largest_closure_ms", score.largest_closure_ms}};
+}
+
+nlohmann::json row_of(const LoopDrive& drive, std::uint64_t seed, const LoopScore& score) {
+  nlohmann::json row{{"drive", drive.name},
+                     {"run_seed", seed},
+                     {"frames", drive.scans.size()},
+                     {"length_m", drive.length_m},
+                     {"odometry_end_m", drive.closing_error_m}};
+  row.update(path_json(score));
+  row.update(closures_json(score));
+  row.update(times_json(score));
+  return row;
 }
 
 /// The solutions of one drive.
@@ -158,6 +170,24 @@ void run_loops(LoopsOptions options) {
   harness::write_json(options.json, harness::result_document("loops", config, rows));
 }
 
+void add_run_options(CLI::App& command, LoopsOptions& options) {
+  command.add_option("--runs", options.runs, "Draws of the odometry for each drive")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  command.add_option("--seed", options.seed, "Seed of the odometry")->capture_default_str();
+  command.add_option("--jobs", options.jobs, "Runs side by side")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+}
+
+/// Which solutions of a drive are made.
+void add_solution_options(CLI::App& command, LoopsOptions& options) {
+  command.add_flag("!--no-batch", options.batch, "Without the batch solution");
+  command.add_flag("!--no-without", options.without, "Without the drive without the loop closer");
+  command.add_flag("--reckon", options.reckon,
+                   "The loop closer alone, beside a mapper that only reckons by odometry");
+}
+
 }  // namespace
 
 std::string name_of(const std::string& folder) {
@@ -179,11 +209,8 @@ void add_loops_experiment(CLI::App& eval) {
       ->capture_default_str();
   command.add_option("--blind", options->blind,
                      "Share of the drive on which no stem is seen, FROM-TO");
-  add_number(command, "--runs", options->runs, 1, 10000, "Draws of the odometry for each drive");
-  command.add_option("--seed", options->seed, "Seed of the odometry")->capture_default_str();
-  add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
-  command.add_flag("--reckon", options->reckon,
-                   "The loop closer alone, beside a mapper that only reckons by odometry");
+  add_run_options(command, *options);
+  add_solution_options(command, *options);
   command.add_option("--json", options->json, "Result document");
   command.callback([options] { run_guarded("loops", [options] { run_loops(*options); }); });
 }

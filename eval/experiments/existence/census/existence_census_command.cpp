@@ -114,19 +114,25 @@ nlohmann::json row_of(const CensusCase& one, std::size_t drive, const CensusAnsw
           {"gone_removed_pct", 100.0 * removed_share(answers.points, false)}};
 }
 
-/// What only the processes have: a map.
-void add_map(const CensusRun& run, std::size_t drive, nlohmann::json& row) {
-  const CensusAfterDrive& after = run.after[drive];
+/// Stems of the map after a drive, by whether they are still there.
+nlohmann::json stems_of_map(const CensusRun& run, std::size_t drive) {
   std::size_t gone = 0, gone_unused = 0, there = 0, there_unused = 0;
-  for (const MappedStem& one : after.stems) {
+  for (const MappedStem& one : run.after[drive].stems) {
     const bool exists = run.history.drives[drive].truth[one.stem].exists;
     (exists ? there : gone) += 1;
     (exists ? there_unused : gone_unused) += one.is_in_use ? 0 : 1;
   }
-  row["gone"] = gone;
-  row["gone_unused"] = gone_unused;
-  row["there"] = there;
-  row["there_unused"] = there_unused;
+  return {{"gone", gone},
+          {"gone_unused", gone_unused},
+          {"there", there},
+          {"there_unused", there_unused}};
+}
+
+/// What only the processes have: a map.
+void add_map(const CensusRun& run, std::size_t drive, nlohmann::json& row) {
+  row.update(stems_of_map(run, drive));
+
+  const CensusAfterDrive& after = run.after[drive];
   row["landmarks"] = after.landmarks;
   row["in_use"] = after.in_use;
   row["recruits_in_use"] = after.recruits_in_use;
@@ -154,25 +160,31 @@ nlohmann::json rows_of(const CensusCase& one, const CensusOptions& options, cons
   return rows;
 }
 
+void print_answers(const nlohmann::json& row) {
+  const auto n = [&](const char* key) { return row[key].get<double>(); };
+  fmt::print(
+      "{:<8} missed {:>2.0f} % ranges {} errors {:<11} drive {} {:<18} {:>5.0f} stems: AUC {:.4f} "
+      "Brier {:.4f} found {:>5.1f} wrong {:>5.2f} gone {:>5.1f}",
+      row["part"].get<std::string>(), n("missed_pct"), row["has_ranges"].get<bool>(),
+      row["errors"].get<std::string>(), n("drives"), row["method"].get<std::string>(), n("points"),
+      n("auc"), n("brier"), n("found_at_1_pct"), n("wrongly_removed_pct"), n("gone_removed_pct"));
+}
+
+void print_map(const nlohmann::json& row) {
+  const auto n = [&](const char* key) { return row[key].get<double>(); };
+  fmt::print(
+      " | gone unused {:.0f} of {:.0f}, there {:.0f} of {:.0f}; {:.0f} landmarks, {:.0f} in use, "
+      "{:.0f} ghosts, {:.0f} doubles, {:.0f} recruits; placed {:.0f} of {:.0f} in {:.0f} maps, ATE "
+      "{:.2f} m",
+      n("gone_unused"), n("gone"), n("there_unused"), n("there"), n("landmarks"), n("in_use"),
+      n("ghosts_in_use"), n("doubles_in_use"), n("recruits_in_use"), n("placed"), n("updates"),
+      n("maps"), n("ate_m"));
+}
+
 void print_census(const nlohmann::json& rows) {
   for (const nlohmann::json& row : rows) {
-    const auto n = [&](const char* key) { return row[key].get<double>(); };
-    fmt::print(
-        "{:<8} missed {:>2.0f} % ranges {} errors {:<11} drive {} {:<18} {:>5.0f} stems: AUC "
-        "{:.4f} "
-        "Brier {:.4f} found {:>5.1f} wrong {:>5.2f} gone {:>5.1f}",
-        row["part"].get<std::string>(), n("missed_pct"), row["has_ranges"].get<bool>(),
-        row["errors"].get<std::string>(), n("drives"), row["method"].get<std::string>(),
-        n("points"), n("auc"), n("brier"), n("found_at_1_pct"), n("wrongly_removed_pct"),
-        n("gone_removed_pct"));
-    if (row.contains("gone"))
-      fmt::print(
-          " | gone unused {:.0f} of {:.0f}, there {:.0f} of {:.0f}; {:.0f} landmarks, {:.0f} in "
-          "use, {:.0f} ghosts, {:.0f} doubles, {:.0f} recruits; placed {:.0f} of {:.0f} in {:.0f} "
-          "maps, ATE {:.2f} m",
-          n("gone_unused"), n("gone"), n("there_unused"), n("there"), n("landmarks"), n("in_use"),
-          n("ghosts_in_use"), n("doubles_in_use"), n("recruits_in_use"), n("placed"), n("updates"),
-          n("maps"), n("ate_m"));
+    print_answers(row);
+    if (row.contains("gone")) print_map(row);
     fmt::print("\n");
   }
   std::fflush(stdout);
@@ -220,6 +232,48 @@ void run_censuses(const CensusCommand& options) {
   harness::write_json(options.json, harness::result_document("existence-census", config, rows));
 }
 
+void add_run_options(CLI::App& command, CensusCommand& options) {
+  command.add_option("--runs", options.runs, "Sets of drives")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--seed", options.seed, "Seed of the first one")->capture_default_str();
+  command.add_option("--jobs", options.jobs, "Runs side by side")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+}
+
+/// Which forests are driven through.
+void add_case_options(CLI::App& command, CensusCommand& options) {
+  command
+      .add_option("--missed", options.missed,
+                  "Share of the stems that a drive misses: one of the two alone")
+      ->check(CLI::IsMember({0.36, 0.66}));
+  command.add_option("--only", options.only, "The forest that changed, or the one that did not")
+      ->check(CLI::IsMember({"change", "control"}));
+  command
+      .add_option("--errors", options.errors,
+                  "independent: white noise of 3 cm; shared: as measured on a recorded walk, where "
+                  "36 % are missed (with ranges, and the forest that did not change)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"shared", "independent"}))
+      ->capture_default_str();
+}
+
+/// How a forest is driven through, and with what.
+void add_drive_options(CLI::App& command, CensusOptions& census) {
+  command.add_option("--drives", census.forest.drives, "After the one that maps")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  command.add_option("--pass-m", census.pass_m, "looks.pass_m instead of the configured")
+      ->check(CLI::Range(1.0, 1e6));
+  command.add_option("--logs", census.logs,
+                     "Folder for the inputs of each drive, as logs, and the maps");
+  command.add_flag("--state-covariances", census.state_covariances,
+                   "The map file has the covariances of MAP");
+  command.add_option("--config", census.config_dir, "Configuration folder of the chain")
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_existence_census_experiment(CLI::App& eval) {
@@ -228,29 +282,9 @@ void add_existence_census_experiment(CLI::App& eval) {
       "A real forest at two censuses, driven through keyframer, mapper and existence tracker");
   const auto options = std::make_shared<CensusCommand>();
   options->census.forest.scan_every_m = 0.5;
-  add_number(command, "--runs", options->runs, 1, 1000, "Sets of drives");
-  command.add_option("--seed", options->seed, "Seed of the first one")->capture_default_str();
-  add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
-  command
-      .add_option("--missed", options->missed,
-                  "Share of the stems that a drive misses: one of the two alone")
-      ->check(CLI::IsMember({0.36, 0.66}));
-  command.add_option("--only", options->only, "The forest that changed, or the one that did not")
-      ->check(CLI::IsMember({"change", "control"}));
-  command
-      .add_option("--errors", options->errors,
-                  "independent: white noise of 3 cm; shared: as measured on a recorded walk, where "
-                  "36 % are missed (with ranges, and the forest that did not change)")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"shared", "independent"}))
-      ->capture_default_str();
-  add_number(command, "--drives", options->census.forest.drives, 1, 100, "After the one that maps");
-  command.add_option("--logs", options->census.logs,
-                     "Folder for the inputs of each drive, as logs, and the maps");
-  command.add_flag("--state-covariances", options->census.state_covariances,
-                   "The map file has the covariances of MAP");
-  command.add_option("--config", options->census.config_dir, "Configuration folder of the chain")
-      ->capture_default_str();
+  add_run_options(command, *options);
+  add_case_options(command, *options);
+  add_drive_options(command, options->census);
   command.add_option("--data", options->data,
                      "Folder with stem_censuses and tree_existence; default $UNDERSTORY_DATA");
   command.add_option("--json", options->json, "Result document");
