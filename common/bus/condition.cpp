@@ -23,9 +23,9 @@ void Condition::add(bool is_bad) {
 void describe(ConditionLimits& limits, const std::string& name, const std::string& unit,
               const std::string& what, ParameterTable& table) {
   table.add("health." + name + "_window", limits.window, {1, kMostEvents}, unit,
-            "Latest events by which HEALTH is judged: " + what);
+            "Latest events that HEALTH judges; bad ones: " + what);
   table.add("health." + name + "_raise_at", limits.raise_at, {1, kMostEvents}, unit,
-            "HEALTH is not OK from so many of them, until a quarter of that is left.");
+            "HEALTH is not OK from this many bad ones on, until a quarter of them is left.");
 }
 
 }  // namespace understory::bus

@@ -25,19 +25,17 @@ void describe(RuntimeParameters& parameters, ParameterTable& table) {
   table.add("runtime.channel_suffix", parameters.channel_suffix, {},
             "Appended to the name of every output, to run two variants side by side.");
   table.add("runtime.suffixed_inputs", parameters.suffixed_inputs, {},
-            "Inputs, separated by commas, whose names carry the suffix too.");
+            "Inputs, separated by commas, whose names get the suffix, too.");
   table.add("runtime.snapshot_every_s", parameters.snapshot_every_s, {0.1, 3600.0}, "s",
             "Message time between two snapshots of the state.");
   table.add("runtime.snapshot_every_events", parameters.snapshot_every_events, {1, 1000000}, "",
             "Inputs between two snapshots of the state.");
-  table.add(
-      "runtime.largest_clock_jump_s", parameters.largest_clock_jump_s, {0.1, 86400.0}, "s",
-      "A message whose stamp is farther from the others waits until three in a row agree, and "
-      "is refused where they do not. Channels that are slower, or behind, need no proof.");
-  table.add(
-      "runtime.refused_of_last_32", parameters.refused_of_last_32, {1, 32}, "messages",
-      "HEALTH says input_refused where so many of an input's last 32 messages were refused or "
-      "came late, until a quarter of that is left.");
+  table.add("runtime.largest_clock_jump_s", parameters.largest_clock_jump_s, {0.1, 86400.0}, "s",
+            "A message whose stamp is farther from the others waits until three consecutive ones "
+            "agree; else it is refused. Slower or later channels are not checked.");
+  table.add("runtime.refused_of_last_32", parameters.refused_of_last_32, {1, 32}, "messages",
+            "HEALTH says input_refused if this many of an input's last 32 messages were refused or "
+            "late, until a quarter of them is left.");
 }
 
 NodeOptions node_options(const std::string& process, const RuntimeParameters& parameters) {

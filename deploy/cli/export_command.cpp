@@ -174,7 +174,7 @@ void add_export_command(CLI::App& parent) {
   auto options = std::make_shared<ExportOptions>();
   command->add_option("log", options->log, "An LCM log with the mapper's output")->required();
   command
-      ->add_option("--out", options->out, "Directory for the files; of mcap also a file NAME.mcap")
+      ->add_option("--out", options->out, "Directory for the files; for mcap also a file NAME.mcap")
       ->required();
 
   command
@@ -185,11 +185,10 @@ void add_export_command(CLI::App& parent) {
       ->delimiter(',')
       ->check(CLI::IsMember({"tum", "kitti", "csv", "g2o", "geojson", "mcap"}))
       ->capture_default_str();
-  command->add_option(
-      "--frame-of", options->frame_of,
-      "A georeferenced map file with which the drive began: for geojson; the landmarks "
-      "must show it");
-  command->add_flag("--force", options->force, "--frame-of also where landmarks do not show it");
+  command->add_option("--frame-of", options->frame_of,
+                      "For geojson: the georeferenced map file with which the drive began; the "
+                      "landmarks must agree");
+  command->add_flag("--force", options->force, "Use --frame-of even if the landmarks do not agree");
   command->callback([options] { run(*options); });
 }
 

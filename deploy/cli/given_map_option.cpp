@@ -44,13 +44,13 @@ bool has_state(const fs::path& folder) {
 void add_given_map_options(CLI::App& command, GivenMapOptions& options) {
   const std::string group = "Given map";
   auto* map = command.add_option("--map", options.file,
-                                 "A map file to begin with, anywhere in it (see `understory map`)");
+                                 "Map file to begin in, at any place of it (see `understory map`)");
   map->group(group);
-  command.add_option("--map-id", options.map_id, "Its map of this number, where it has several")
+  command.add_option("--map-id", options.map_id, "Number of the map, if the file has several")
       ->group(group)
       ->needs(map)
       ->check(CLI::Range(std::uint32_t{1}, map_file::kLastMapId));
-  command.add_flag("--localisation-only", options.localisation_only, "The map stays as it is")
+  command.add_flag("--localisation-only", options.localisation_only, "Do not change the map")
       ->group(group)
       ->needs(map);
 }

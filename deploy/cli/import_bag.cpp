@@ -192,8 +192,8 @@ void import_bag(const BagImportOptions& options) {
 void add_choices(CLI::App& command, BagImportOptions& options) {
   BagTopics& topics = options.topics;
   command.add_option("--cloud", topics.cloud,
-                     "Topic of the laser in space, where there are several; none: no cloud");
-  command.add_option("--scan", topics.scan, "Topic of the laser in a plane; likewise");
+                     "Topic of the 3-D laser, if there are several; none: no cloud");
+  command.add_option("--scan", topics.scan, "Topic of the one-plane laser; likewise");
   command.add_option("--imu", topics.imu, "Topic of the IMU; likewise");
   command.add_option("--gnss", topics.gnss, "Topic of the fixes; likewise");
   command.add_option("--odometry", topics.odometry,
@@ -206,30 +206,32 @@ void add_frames(CLI::App& command, BagImportOptions& options) {
                      "Frame of the vehicle (default: base_link, base_footprint)");
   command
       .add_option("--mount", options.mounts,
-                  "FRAME=x,y,z[,roll,pitch,yaw] [m, rad]: where a sensor sits")
+                  "FRAME=x,y,z[,roll,pitch,yaw] [m, rad]: mount of a sensor")
       ->allow_extra_args(false);
   command.add_option(
       "--truth-frame", options.conversion.truth_frame,
-      "Frame whose pose --truth is (default: as its messages say, else the vehicle)");
+      "Frame of the poses of --truth (default: as the messages say, else the vehicle)");
   command.add_option("--config", options.config, "Write a configuration folder for replay");
 }
 
 void add_readings(CLI::App& command, BagImportOptions& options) {
   BagConversion& conversion = options.conversion;
   command
-      .add_option(
-          "--receive-time", options.receive_time,
-          "Topic whose clock is wrong: its stamps are laid onto the recorder's clock; stamps "
-          "of 0 become the times of reception")
+      .add_option("--receive-time", options.receive_time,
+                  "Topic with a wrong clock: its stamps are shifted to the recorder's clock; "
+                  "stamps of 0 become the times of reception")
       ->allow_extra_args(false);
   add_cloud_options(command, conversion.cloud);
-  command.add_option("--model", conversion.laser.model,
-                     "Of packets; default: what they look like. One of " + packets::known_models());
+  command.add_option(
+      "--model", conversion.laser.model,
+      "Laser of the packets; default: as found from them. One of " + packets::known_models());
   command.add_option(
       "--metadata,--calibration", conversion.laser.source,
-      "Of packets: Ouster's metadata (JSON; default: the bag's), the HDL-64E's XML or YAML file, "
+      "For packets: Ouster's metadata (JSON; default: the bag's), the HDL-64E's XML or YAML file, "
       "Hesai's angle correction file (CSV)");
-  command.add_option("--wheelbase", conversion.wheelbase_m, "For the steering of RAW_WHEELS [m]")
+  command
+      .add_option("--wheelbase", conversion.wheelbase_m,
+                  "Wheelbase, for the steering angle of RAW_WHEELS [m]")
       ->check(CLI::Range(0.1, 30.0))
       ->capture_default_str();
   command.add_flag("--speed-from-pose", conversion.has_speed_from_pose,
@@ -244,7 +246,8 @@ void add_bag_import(CLI::App& import) {
       "bag", "A ROS 1 bag, ROS 2 bag (SQLite, MCAP) or a folder of them, without ROS");
   command->add_option("path", options->path, "A file, or the folder of one recording")->required();
   command->add_option("--out", options->out, "The log to write");
-  command->add_flag("--list", options->is_list, "Show what is in it and what would be imported");
+  command->add_flag("--list", options->is_list,
+                    "Show the contents and the import that would be made");
   add_choices(*command, *options);
   add_frames(*command, *options);
   add_readings(*command, *options);

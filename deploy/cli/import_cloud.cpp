@@ -16,7 +16,7 @@ void add_cloud_options(CLI::App& command, bag::CloudOptions& cloud) {
       ->check(CLI::IsMember(kUnits_s));
   command
       .add_option("--max-range", cloud.max_range_m,
-                  "Range of the laser in space; points more than 1 % beyond are left out [m]")
+                  "Range of the 3-D laser; points more than 1 % beyond are left out [m]")
       ->check(CLI::Range(1.0, 1000.0))
       ->capture_default_str();
 }

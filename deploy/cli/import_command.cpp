@@ -118,7 +118,7 @@ void add_import_command(CLI::App& parent) {
       ->required();
   victoria->add_option("--out", options->out, "The log to write")->required();
   victoria->add_flag("--raw", options->raw,
-                     "RAW_SCAN, RAW_WHEELS, RAW_GNSS: what lidar_imu_input takes");
+                     "Write RAW_SCAN, RAW_WHEELS, RAW_GNSS: the inputs of lidar_imu_input");
 
   victoria->callback([options] { import_victoria_park(*options); });
   add_bag_import(*command);

@@ -205,21 +205,22 @@ void add_packet_import(CLI::App& import) {
   command->add_option("path", options->path, "A pcap or pcapng file")->required();
   command->add_option("--out", options->out, "The log to write");
   command->add_flag("--list", options->list, "Show senders, ports and makers; write nothing");
-  command->add_option("--model", options->model,
-                      "Default: what the packets look like. One of " + packets::known_models());
+  command->add_option(
+      "--model", options->model,
+      "Laser of the packets; default: as found from them. One of " + packets::known_models());
   command->add_option(
       "--metadata,--calibration", options->file,
       "Ouster's metadata (JSON; default: FILE.json beside FILE.pcap), the HDL-64E's "
       "XML or YAML file, Hesai's angle correction file (CSV)");
   command->add_option("--sensor", options->sensor,
-                      "IPv4 address of the laser, where the capture has several");
+                      "IPv4 address of the laser, if the capture has several");
   command
       ->add_option("--period", options->period_s,
                    "Duration of a sweep [s] of a Livox laser, whose pattern does not repeat")
       ->check(CLI::Range(0.01, 10.0));
   command
       ->add_option("--max-range", options->max_range_m,
-                   "Leave out what is farther away [m]; default: the model's range")
+                   "Leave out points farther than this [m]; default: the model's range")
       ->check(CLI::Range(0.0, 1000.0));
   add_table_options(*command, options->tables);
   command->callback([options] { run_packet_import(*options); });

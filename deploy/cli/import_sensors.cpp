@@ -150,8 +150,8 @@ void add_sensor_imports(CLI::App& import) {
       ->check(CLI::IsMember({"icp", "oxts"}));
   reduced
       ->add_option("--laser", options->laser,
-                   "x,y,yaw [m, rad] of the laser, whose poses these are, on the vehicle; default: "
-                   "that of 2011_09_26, as in deploy/config/kitti")
+                   "x,y,yaw [m, rad] of the laser on the vehicle (the poses are the laser's); "
+                   "default: that of 2011_09_26, as in deploy/config/kitti")
       ->delimiter(',')
       ->expected(3);
   CLI::App* csv =

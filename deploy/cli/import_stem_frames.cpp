@@ -124,10 +124,10 @@ void add_stem_frames_import(CLI::App& import) {
       ->capture_default_str();
   command
       ->add_option("--odometry-deg", options->odometry_deg,
-                   "Noise of its heading, 1 sigma per frame [degrees]")
+                   "Noise of the heading of ODOMETRY, 1 sigma per frame [degrees]")
       ->check(CLI::Range(0.0, 90.0))
       ->capture_default_str();
-  command->add_option("--seed", options->seed, "Seed of that noise")->capture_default_str();
+  command->add_option("--seed", options->seed, "Seed of the noise")->capture_default_str();
   command
       ->add_option("--sigma-m", options->sigma_m,
                    "Standard deviation that LANDMARKS state, per axis [m]")

@@ -289,7 +289,7 @@ void add_launch_command(CLI::App& parent) {
   auto options = std::make_shared<LaunchOptions>();
   command->add_option("--config", options->config, "Directory with launch.toml and one file each")
       ->capture_default_str();
-  command->add_option("--state-dir", options->state, "Where the processes keep their state")
+  command->add_option("--state-dir", options->state, "Directory of the processes' state")
       ->capture_default_str();
   command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
   command->add_option("--report", options->report, "Write what happened to this JSON file");

@@ -232,20 +232,20 @@ void add_log_command(CLI::App& parent) {
   record_command->add_option("--lcm-url", options->record.lcm_url,
                              "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
   record_command->add_option("--channels", options->record.channels, "Regular expression");
-  record_command->add_flag("--sweeps", options->record.sweeps, "RAW_SWEEP and LIDAR_SWEEP, too");
+  record_command->add_flag("--sweeps", options->record.sweeps,
+                           "Also record RAW_SWEEP and LIDAR_SWEEP");
   record_command->add_flag("--force", options->record.force, "Overwrite an existing file");
   record_command->callback(
       guarded(options, [](const LogOptions& o) { log_record(o.file, o.record); }));
 
-  auto* info_command = add("info", "What is in it");
+  auto* info_command = add("info", "Contents of a log");
   info_command->add_flag("--json", options->json, "As JSON");
   info_command->callback(guarded(options, [](const LogOptions& o) { info(o.file, o.json); }));
 
-  add("check", "What is wrong with it; exit status 1 when something is")
+  add("check", "Faults of a log; exit status 1 if there are any")
       ->callback(guarded(options, [](const LogOptions& o) { check(o.file); }));
 
-  auto* accuracy_command =
-      add("accuracy", "How well the run in it agrees with the ground truth in it");
+  auto* accuracy_command = add("accuracy", "Errors of the run against the ground truth in the log");
   accuracy_command->add_option("--json", options->accuracy.json_file,
                                "Also write it to this file, with series");
   accuracy_command
@@ -266,11 +266,11 @@ void add_log_command(CLI::App& parent) {
   accuracy_command->callback(
       guarded(options, [](const LogOptions& o) { log_accuracy(o.file, o.accuracy); }));
 
-  auto* repair_command = add("repair", "Writes what can be read as a log without damage");
+  auto* repair_command = add("repair", "Writes the readable events as a log without damage");
   repair_command->add_option("--out", options->out, "The new log")->required();
   repair_command->callback(guarded(options, [](const LogOptions& o) { repair(o.file, o.out); }));
 
-  auto* cut_command = add("cut", "A part of it, by receive time and channel");
+  auto* cut_command = add("cut", "A part of a log, by receive time and channel");
   cut_command->add_option("--out", options->out, "The new log")->required();
   cut_command->add_option("--from", options->cut.from_s, "[s] from the first event");
   cut_command->add_option("--to", options->cut.to_s, "[s] from the first event");

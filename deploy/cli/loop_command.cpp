@@ -118,7 +118,7 @@ void add_common_options(CLI::App& command, LoopOptions& options) {
   command.add_option("--map-id", options.map_id, "Number of the map")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
-  command.add_option("--timeout", options.timeout_s, "How long to wait for the mapper [s]")
+  command.add_option("--timeout", options.timeout_s, "Longest wait for the mapper [s]")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
   command.add_option("--lcm-url", options.lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
@@ -126,33 +126,36 @@ void add_common_options(CLI::App& command, LoopOptions& options) {
 
 void add_close(CLI::App& parent) {
   auto* command = parent.add_subcommand(
-      "close", "Two places are one, or lie so to each other: counts where the graph allows it");
+      "close",
+      "Sets the relative pose of two places (default: one place); used if the graph allows it");
   auto options = std::make_shared<LoopOptions>();
   command->add_option("--from", options->from, "keyframe:N, or submap:N after it was handed over")
       ->required();
   command->add_option("--to", options->to, "Likewise")->required();
-  command->add_option("--x", options->x_m, "Of `to` in the frame of `from`, ahead [m]")
+  command->add_option("--x", options->x_m, "Position of `to` in the frame of `from`, ahead [m]")
       ->capture_default_str();
   command->add_option("--y", options->y_m, "Likewise, to the left [m]")->capture_default_str();
-  command->add_option("--theta-deg", options->theta_deg, "Heading of `to` in it [degrees]")
+  command
+      ->add_option("--theta-deg", options->theta_deg,
+                   "Heading of `to` in the frame of `from` [degrees]")
       ->capture_default_str();
   command->add_option("--sigma", options->sigma_m, "Standard deviation of x and of y [m]")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
-  command->add_option("--sigma-deg", options->sigma_deg, "The same of the heading [degrees]")
+  command
+      ->add_option("--sigma-deg", options->sigma_deg, "Standard deviation of the heading [degrees]")
       ->check(CLI::Range(1e-3, 180.0))
       ->capture_default_str();
   command
       ->add_option("--id", options->id,
-                   "Number of the closure; without it one that follows from "
-                   "the rest")
+                   "Number of the closure (default: made from the other options)")
       ->check(CLI::Range(std::uint64_t{1}, kManualClosures - 1));
   add_common_options(*command, *options);
   command->callback([options] { close_loop(*options); });
 }
 
 void add_revoke(CLI::App& parent) {
-  auto* command = parent.add_subcommand("revoke", "Takes a closure back, whoever set it");
+  auto* command = parent.add_subcommand("revoke", "Revokes a closure, set by hand or found");
   auto options = std::make_shared<LoopOptions>();
   command->add_option("id", options->id, "Number of the closure, as LOOP_CLOSURE has it")
       ->required()

@@ -153,20 +153,21 @@ void run_map_close(const MapCloseOptions& options) {
 }  // namespace
 
 void add_map_close(CLI::App& map) {
-  auto* command = map.add_subcommand(
-      "close",
-      "Closes a loop between two submaps of a drive's map; without a pose it finds it from the "
-      "landmarks of both. `map revert` takes it back");
+  auto* command =
+      map.add_subcommand("close",
+                         "Closes a loop between two submaps of a drive's map; without a pose it "
+                         "finds one from the landmarks of both. `map revert` undoes it");
   const auto options = std::make_shared<MapCloseOptions>();
   command->add_option("file", options->file, "A map file that submap_store wrote")->required();
   command->add_option("--from", options->from, "One end: submap:N, or keyframe:N by its sequence")
       ->required();
   command->add_option("--to", options->to, "The other end")->required();
-  command->add_option("--map", options->map_id, "The map, where several have submaps")
+  command->add_option("--map", options->map_id, "Number of the map, if several have submaps")
       ->check(CLI::Range(std::uint32_t{1}, map_file::kLastMapId));
-  add_said_pose(*command, options->pose, "--to is in the frame of --from");
-  command->add_flag("--force", options->force, "Also where it contradicts the map beyond chance");
-  command->add_flag("--dry-run", options->dry_run, "Says what it would do, and writes nothing");
+  add_said_pose(*command, options->pose, "--to in the frame of --from");
+  command->add_flag("--force", options->force,
+                    "Close it even if it contradicts the map by more than chance explains");
+  command->add_flag("--dry-run", options->dry_run, "Show the result and write nothing");
   command->add_flag("--json", options->json, "As JSON, on standard output");
   command->callback([options] { guarded_map_work([&] { run_map_close(*options); }); });
 }

@@ -319,25 +319,26 @@ void add_map_command(CLI::App& parent) {
     return command;
   };
 
-  add_json_flag(*add("info", "What is in it", map_info), options->json);
-  add("check", "What is wrong with it; exit status 1 when something is", map_check);
+  add_json_flag(*add("info", "Contents of a map file", map_info), options->json);
+  add("check", "Faults of a map file; exit status 1 if there are any", map_check);
   add_map_import(*map);
   add_map_georeference(*map);
   add_map_export(*map);
   add_map_merge(*map);
   add_map_close(*map);
-  add_json_flag(*add("log", "Its changes, the oldest first", map_log), options->json);
+  add_json_flag(*add("log", "Changes of a map file, the oldest first", map_log), options->json);
 
-  add("revert", "All maps as they were after a change; that is a change, too", map_revert)
+  add("revert", "Restores all maps as they were after a change; this is a new change", map_revert)
       ->add_option("--to", options->to, "Number of the change; 0: before the first one")
       ->required();
-  add("accept", "Takes what another program changed (QGIS, say) over as a change", map_accept);
+  add("accept", "Records the edits of another program (e.g. QGIS) as a change", map_accept);
   auto* diff =
       add("diff", "Landmarks added, removed, moved, out of use and back from one file to another",
           map_diff);
   diff->add_option("other", options->other, "The later map file")->required()->check(no_dash());
   diff->add_option("--quantile", options->limits.quantile,
-                   "A landmark has moved where chi2 of its way, by both covariances, is beyond it")
+                   "A landmark has moved if the chi2 of its displacement, by both covariances, "
+                   "exceeds this quantile")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   diff->add_option("--sigma-m", options->limits.unknown_sigma_m,
@@ -345,8 +346,8 @@ void add_map_command(CLI::App& parent) {
       ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
   diff->add_option("--probability-change", options->limits.probability_change,
-                   "Of a landmark's probability of existence: a larger change is told, as is "
-                   "every landmark that left use or is used again")
+                   "Least change of a probability of existence that is listed; landmarks that left "
+                   "use or are used again always are")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   add_json_flag(*diff, options->json);

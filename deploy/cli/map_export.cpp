@@ -205,10 +205,9 @@ void add_map_export(CLI::App& map) {
   command->add_option("--out", options->out, "Directory; each map has a folder map-N in it")
       ->required();
   command
-      ->add_option(
-          "--format", options->formats,
-          "csv: metres of the map; geojson: longitude and latitude (default: both where it is "
-          "known where the map lies, else csv)")
+      ->add_option("--format", options->formats,
+                   "csv: metres of the map; geojson: longitude and latitude (default: both if the "
+                   "map is georeferenced, else csv)")
       ->delimiter(',')
       ->check(CLI::IsMember({"csv", "geojson"}));
   command->callback([options] { guarded_map_work([&] { run_map_export(*options); }); });

@@ -178,9 +178,9 @@ void run_map_georeference(const GeoreferenceOptions& options) {
 }  // namespace
 
 void add_map_georeference(CLI::App& map) {
-  auto* command = map.add_subcommand("georeference",
-                                     "Says where the maps of a file lie on the earth; coordinates "
-                                     "stay. `map revert` takes it back");
+  auto* command = map.add_subcommand(
+      "georeference",
+      "Sets the place of a file's maps on the earth; coordinates stay. `map revert` undoes it");
   const auto options = std::make_shared<GeoreferenceOptions>();
   command->add_option("file", options->file, "A map file")->required();
   command->add_option("--control-points", options->control_points,
@@ -193,26 +193,25 @@ void add_map_georeference(CLI::App& map) {
                       "and longitude) at the times of keyframes");
   command
       ->add_option("--antenna-m", options->antenna_m,
-                   "[m] Where the antenna of the fixes is in the vehicle: FORWARD,LEFT")
+                   "[m] Place of the GNSS antenna on the vehicle: FORWARD,LEFT")
       ->delimiter(',')
       ->expected(2);
-  command->add_option("--map", options->map_id, "The map that the fixes are of")
+  command->add_option("--map", options->map_id, "Number of the map that the drive of --fixes made")
       ->check(CLI::Range(std::uint32_t{1}, map_file::kLastMapId));
-  command->add_option(
-      "--like", options->like,
-      "A map file in whose frame the maps are, since their drive began with it; their "
-      "landmarks must show it");
-  command->add_flag(
-      "--force", options->force,
-      "--like also where landmarks do not show it; control points also more than 1,000 km "
-      "outside of the area of --crs");
+  command->add_option("--like", options->like,
+                      "A map file with which the drive of the maps began: the frame is the same; "
+                      "the landmarks must agree");
+  command->add_flag("--force", options->force,
+                    "Use --like even if the landmarks do not agree; accept control points more "
+                    "than 1,000 km outside of the area of --crs");
 
   command
       ->add_option("--most-rms-m", options->most_rms_m,
-                   "[m] Points that are farther off are refused (default: 1, fixes 10)")
+                   "[m] Largest RMS distance of the points from the map that is accepted (default: "
+                   "1, fixes 10)")
       ->check(CLI::Range(1e-3, 1e3));
-  command->add_flag("--replace", options->replace, "Also where the file is georeferenced already");
-  command->add_flag("--dry-run", options->dry_run, "Says where it would lie, and writes nothing");
+  command->add_flag("--replace", options->replace, "Replace the place that the file has already");
+  command->add_flag("--dry-run", options->dry_run, "Show the place and write nothing");
   command->callback([options] { guarded_map_work([&] { run_map_georeference(*options); }); });
 }
 

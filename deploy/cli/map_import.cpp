@@ -239,26 +239,25 @@ void run_map_import(const MapImportOptions& options) {
 void add_place_options(CLI::App& command, MapImportOptions& options) {
   command
       .add_option("--origin", options.table.origin,
-                  "Where the map's origin lies in the table's coordinates: EAST,NORTH, or LAT,LON "
-                  "in degrees (default: 0,0; with --crs near the middle of the table)")
+                  "Origin of the map in the table's coordinates: EAST,NORTH, or LAT,LON in degrees "
+                  "(default: 0,0; with --crs near the middle of the table)")
       ->delimiter(',')
       ->expected(2);
   command.add_option("--crs", options.table.crs,
                      "Reference system of the table: EPSG:25832, EPSG:4326, ... Coordinates become "
-                     "metres near the map's origin, and the file says where that lies");
+                     "metres from the map's origin, whose place is kept in the file");
   command.add_flag("--force", options.table.is_far_allowed,
-                   "Also coordinates more than 1,000 km outside of the area of --crs");
+                   "Accept coordinates more than 1,000 km outside of the area of --crs");
   command.add_flag("--same-frame", options.same_frame,
-                   "Coordinates are metres in the frame of the maps that --out has (a log: its "
-                   "drive began with one of them)");
+                   "Coordinates are metres in the frame of the maps in --out (a log: its drive "
+                   "began with one of them)");
 }
 
 /// How the rows of a table become landmarks.
 void add_table_options(CLI::App& command, MapTableOptions& table) {
-  command.add_option(
-      "--columns", table.columns,
-      "Which column is what, where the headings do not say it: "
-      "x=HEADING,y=HEADING (or lat=, lon=),dbh_cm=HEADING,sigma_m=HEADING,kind=HEADING");
+  command.add_option("--columns", table.columns,
+                     "Meaning of columns with other headings: x=HEADING,y=HEADING (or lat=, "
+                     "lon=),dbh_cm=HEADING,sigma_m=HEADING,kind=HEADING");
   command
       .add_option("--sigma-m", table.sigma_m,
                   "[m] Standard deviation in x and in y where the table has no sigma_m")
@@ -282,7 +281,7 @@ void add_map_import(CLI::App& map) {
                    "CSV with the columns x_m,y_m[,sigma_m][,dbh_m][,kind] (or easting, northing, "
                    "'BHD [cm]' and the like), or an LCM log with the mapper's output")
       ->required();
-  command->add_option("--out", options->out, "The map file; made, or added to")->required();
+  command->add_option("--out", options->out, "The map file; created, or added to")->required();
   add_place_options(*command, *options);
   add_table_options(*command, options->table);
   command

@@ -306,17 +306,17 @@ MapMergeOptions settled(MapMergeOptions options) {
 
 void add_map_merge(CLI::App& map) {
   auto* command = map.add_subcommand(
-      "merge", "Two maps that overlap become one; without --into and --out it only says how");
+      "merge", "Merges two maps that overlap; without --into and --out it only shows the result");
   const auto options = std::make_shared<MapMergeOptions>();
   const auto number = CLI::Range(std::uint32_t{1}, map_file::kLastMapId);
   command->add_option("first", options->first, "A map file; its frame and ids stay")->required();
   command->add_option("second", options->second, "A map file; may be the same one")->required();
-  command->add_option("--first-map", options->first_map, "Its map, where it has several")
+  command->add_option("--first-map", options->first_map, "Number of its map, if it has several")
       ->check(number);
   command->add_option("--second-map", options->second_map, "Likewise")->check(number);
 
   auto* into = command->add_option("--into", options->into,
-                                   "One of the two: it gets the merged map, in its frame");
+                                   "One of the two files: it gets the merged map, in its frame");
   command
       ->add_option("--out", options->out,
                    "A new file: the first one with its history, and the merged map")
@@ -326,14 +326,15 @@ void add_map_merge(CLI::App& map) {
                    "[m] Standard deviation in x and in y of landmarks without covariance")
       ->check(CLI::Range(1e-6, 1e3))
       ->capture_default_str();
-  command->add_option("--first-at", options->first_at,
-                      "submap:N or keyframe:N of the first map, or its frame: where the pose is");
+  command->add_option(
+      "--first-at", options->first_at,
+      "Frame of the pose: submap:N or keyframe:N of the first map (default: the map's frame)");
   command->add_option("--second-at", options->second_at,
-                      "Likewise of the second: whose pose it is");
-  add_said_pose(*command, options->pose,
-                "--second-at is in the frame of --first-at, if it is known", "pose-");
+                      "Part of the second map whose pose is given: likewise");
+  add_said_pose(*command, options->pose, "--second-at in the frame of --first-at, if it is known",
+                "pose-");
   command->add_flag("--force", options->force,
-                    "Takes the pose as it was said where the landmarks do not show it");
+                    "Use the given pose even if the landmarks do not agree");
   command->add_flag("--json", options->json, "As JSON, on standard output");
   command->callback([options] { guarded_map_work([&] { run_map_merge(settled(*options)); }); });
 }

@@ -156,7 +156,8 @@ void add_replay_command(CLI::App& parent) {
       ->add_option("--config", options->config,
                    "Directory with launch.toml and one file for each stage")
       ->capture_default_str();
-  command->add_option("--channel-suffix", options->channel_suffix, "Of every output, e.g. _ALT");
+  command->add_option("--channel-suffix", options->channel_suffix,
+                      "Suffix of every output channel, e.g. _ALT");
 
   add_given_map_options(*command, options->map);
   command->add_flag("--outputs-only", options->outputs_only, "Leave the log's own events out");

@@ -27,9 +27,10 @@ geometry::SE2WithCovariance SaidPose::pose() const {
 
 void add_said_pose(CLI::App& command, SaidPose& pose, const std::string& what,
                    const std::string& prefix) {
-  auto* const x = command.add_option("--x-m", pose.x_m, "[m] Where " + what + ": ahead");
+  auto* const x = command.add_option("--x-m", pose.x_m, "[m] Position of " + what + ": ahead");
   auto* const y = command.add_option("--y-m", pose.y_m, "[m] To the left");
-  auto* const theta = command.add_option("--theta-deg", pose.theta_deg, "[deg] Turned left");
+  auto* const theta =
+      command.add_option("--theta-deg", pose.theta_deg, "[deg] Heading, to the left");
   for (auto* const one : {x, y, theta}) {
     one->check(finite());
     for (auto* const other : {x, y, theta})
@@ -43,7 +44,7 @@ void add_said_pose(CLI::App& command, SaidPose& pose, const std::string& what,
       ->needs(x);
   command
       .add_option("--" + prefix + "sigma-deg", pose.sigma_deg,
-                  "[deg] Standard deviation of the turn")
+                  "[deg] Standard deviation of the heading")
       ->check(finite())
       ->check(CLI::Range(1e-3, 180.0))
       ->capture_default_str()

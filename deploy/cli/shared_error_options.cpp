@@ -25,28 +25,30 @@ void add_shared_error_options(CLI::App& command, sim::SharedErrorParameters& sha
   add("--along-noise", shared.along_sigma_m,
       "Standard deviation per axis of a landmark's error that is correlated along the path [m]",
       0.0, 5.0);
-  add("--along-length", shared.along_length_m, "Path after which it is uncorrelated [m]", 1e-3,
-      1e5);
+  add("--along-length", shared.along_length_m,
+      "Path length after which this error is uncorrelated [m]", 1e-3, 1e5);
   add("--direction-noise", shared.direction_sigma_m,
       "Standard deviation per axis of a landmark's error that depends on the direction from which "
       "it is viewed [m]",
       0.0, 5.0);
   command
       .add_option("--direction-harmonics", shared.direction_harmonics,
-                  "Harmonics of it: its correlation at an angle a is the mean of cos(k a)")
+                  "Harmonics of this error: its correlation at an angle a is the mean of cos(k a)")
       ->check(CLI::Range(1, 100))
       ->capture_default_str()
       ->group("Errors that detections share");
   add("--radial-bias", shared.radial_bias_share,
-      "Error of the range as a share of it; < 0: landmarks are detected too near", -0.5, 0.5);
+      "Error of the range as a share of the range; < 0: landmarks are detected too near", -0.5,
+      0.5);
   add("--bearing-bias", shared.bearing_bias_rad,
       "Error of the bearing [rad], times the sine of the bearing", -1.0, 1.0);
   add("--level-noise", shared.level_sigma_rad,
-      "Standard deviation of roll and of pitch that levelling leaves [rad]", 0.0, 0.5);
-  add("--level-length", shared.level_length_m, "Path after which they are uncorrelated [m]", 1e-3,
-      1e5);
+      "Standard deviation of roll and of pitch after levelling [rad]", 0.0, 0.5);
+  add("--level-length", shared.level_length_m,
+      "Path length after which roll and pitch are uncorrelated [m]", 1e-3, 1e5);
   add("--level-height", shared.level_height_m,
-      "Height by which they displace all detections of a scan alike [m]", -100.0, 100.0);
+      "Height at which errors of roll and pitch displace all detections of a scan [m]", -100.0,
+      100.0);
   add("--missed", shared.missed_share, "Share of the landmarks that a drive never detects", 0.0,
       1.0);
 }

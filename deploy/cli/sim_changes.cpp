@@ -116,13 +116,15 @@ void simulate_changes(const ChangesOptions& options) {
 }
 
 void add_object_options(CLI::App& command, changes::DiffParameters& diff) {
-  command.add_option("--share", diff.share, "Of the objects that are removed or moved")
+  command.add_option("--share", diff.share, "Share of the objects that are removed or moved")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--moved", diff.moved_share, "Of these, where they can be moved")
+  command
+      .add_option("--moved", diff.moved_share,
+                  "Share of these objects that are moved, if they can be")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--move", diff.move_m, "How far they are moved [m]")
+  command.add_option("--move", diff.move_m, "Distance by which objects are moved [m]")
       ->check(CLI::Range(0.01, 10.0))
       ->capture_default_str();
   command.add_option("--added", diff.added_share, "New objects per removed one")
@@ -134,8 +136,8 @@ void add_diff_options(CLI::App& command, ChangesOptions& options) {
   add_object_options(command, options.diff);
   command
       .add_option("--clear-cut", options.clear_cut,
-                  "forest: instead of all these, fell so many neighbours and park a lorry that "
-                  "hides about 20 others")
+                  "forest: instead of these changes, fell this many neighbouring trees and park a "
+                  "lorry that hides about 20 others")
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str();
   command.add_option("--hiding", options.diff.occluders, "Lorries or carts parked beside the path")
@@ -144,28 +146,30 @@ void add_diff_options(CLI::App& command, ChangesOptions& options) {
 }
 
 void add_course_options(CLI::App& command, ChangesOptions& options) {
-  command.add_option("--laps", options.course.laps, "Of the path")
+  command.add_option("--laps", options.course.laps, "Laps of the path")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command.add_option("--length", options.course.length_m, "forest: of a lap [m]")
+  command.add_option("--length", options.course.length_m, "forest: length of a lap [m]")
       ->check(CLI::Range(40.0, 5000.0))
       ->capture_default_str();
-  command.add_flag("--no-lidar", options.no_lidar, "No drive.lcm: camera and truth alone");
-  command.add_option("--recall", options.recall, "Of the camera's detector")
+  command.add_flag("--no-lidar", options.no_lidar, "Write no drive.lcm: only camera and truth");
+  command.add_option("--recall", options.recall, "Recall of the camera's detector")
       ->check(CLI::Range(0.0, 1.0));
-  command.add_option("--false-keypoints", options.false_per_frame, "Mean number in a frame")
+  command
+      .add_option("--false-keypoints", options.false_per_frame,
+                  "Mean number of false keypoints in a frame")
       ->check(CLI::Range(0.0, 1e4));
 }
 
 }  // namespace
 
 void add_changes_simulation(CLI::App& sim) {
-  auto* command = sim.add_subcommand(
-      "changes",
-      "One path through an unchanged and several changed copies of a world, as a data set of "
-      "keypoints, LIDAR and IMU with the truth of what changed");
+  auto* command =
+      sim.add_subcommand("changes",
+                         "One path through an unchanged world and changed copies of it: a data set "
+                         "of keypoints, LIDAR, IMU and the true changes");
   auto options = std::make_shared<ChangesOptions>();
-  command->add_option("--world", options->world, "The place")
+  command->add_option("--world", options->world, "Kind of world")
       ->check(CLI::IsMember(changes::scene_names()))
       ->capture_default_str();
   command->add_option("--out", options->out, "The folder to write; new or empty")->required();

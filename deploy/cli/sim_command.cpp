@@ -228,7 +228,7 @@ void add_landmark_options(CLI::App& command, SimOptions& options) {
       ->capture_default_str();
   command
       .add_option("--interval", drive.path.interval,
-                  "Between scans: metres driven or radians rotated")
+                  "Interval between scans [m driven or rad rotated]")
       ->check(CLI::Range(1e-3, 100.0))
       ->capture_default_str();
   command.add_option("--speed", drive.speed_mps, "Speed of the vehicle [m/s]")
@@ -251,10 +251,10 @@ void add_landmark_options(CLI::App& command, SimOptions& options) {
   add_view_option(command, drive.sensor.view_rad);
   command
       .add_option("--trunks-in-view", drive.trunks_in_view,
-                  "The forest is thinned to so many trunks in view on average; 0 = as it is")
+                  "Thin the forest to this mean number of trunks in view; 0 = do not thin it")
       ->check(CLI::Range(0.0, 1e4))
       ->capture_default_str();
-  command.add_flag("--wheels", options.wheels, "ODOMETRY of wheels between scans as well");
+  command.add_flag("--wheels", options.wheels, "Also give ODOMETRY of wheels between scans");
   add_shared_error_options(command, drive.sensor.shared);
 }
 
@@ -265,12 +265,13 @@ void add_sensor_options(CLI::App& command, SimOptions& options) {
       ->group(group)
       ->check(CLI::IsMember(sim::forest_names()))
       ->capture_default_str();
-  command.add_option("--distance", sensors.length_m, "To drive [m]; `urban` has its own")
+  command
+      .add_option("--distance", sensors.length_m, "Distance to drive [m]; `urban` has a fixed one")
       ->group(group)
       ->check(CLI::Range(20.0, 2e5))
       ->capture_default_str();
   refuse_renamed(command, "--way", "--distance");
-  command.add_option("--laps", sensors.laps, "forest3d, urban: laps of the path")
+  command.add_option("--laps", sensors.laps, "Laps of the path (forest3d, urban)")
       ->group(group)
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
@@ -289,11 +290,10 @@ void add_sensor_options(CLI::App& command, SimOptions& options) {
       ->group(group)
       ->check(CLI::IsMember(lidar_names()))
       ->capture_default_str();
-  command.add_flag("--planar-laser", sensors.planar_laser, "A one-plane laser as well")
-      ->group(group);
+  command.add_flag("--planar-laser", sensors.planar_laser, "Add a one-plane laser")->group(group);
   command
       .add_option("--planar-revolution", sensors.planar_revolution_s,
-                  "How long it turns for all around [s]; 0 = all beams at once")
+                  "Time of its revolution [s]; 0 = all beams at one instant")
       ->group(group)
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
@@ -317,9 +317,9 @@ void add_sim_command(CLI::App& parent) {
   command->add_option("--lcm-url", options->lcm_url,
                       "LCM URL of the bus, e.g. udpm://239.255.76.67:7667?ttl=0");
   command
-      ->add_option("--path", options->path,
-                   "Shape of the path, of ideal landmarks and forest3d; stationary: ideal "
-                   "landmarks alone")
+      ->add_option(
+          "--path", options->path,
+          "Shape of the path (ideal landmarks, forest3d); stationary: only with ideal landmarks")
       ->check(CLI::IsMember(sim::path_names()))
       ->capture_default_str();
   add_landmark_options(*command, *options);
@@ -328,7 +328,7 @@ void add_sim_command(CLI::App& parent) {
   command->add_option("--seed", options->seed, "Seed of world, start and noise")
       ->capture_default_str();
   command
-      ->add_option("--rate", options->rate, "Live: factor by which it runs faster than the clock")
+      ->add_option("--rate", options->rate, "Live: speed of the drive, as a multiple of real time")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
   add_stem_frames_simulation(*command);

@@ -124,13 +124,13 @@ void add_detector_options(CLI::App& command, sim::StemDetectorParameters& detect
     command.add_option(name, value, text)->check(CLI::Range(low, high))->capture_default_str();
   };
   add("--range", detector.range_m, "Range of the detector [m]", 2.0, 200.0);
-  add("--seen", detector.seen_share, "Share of the stems that a visit detects at all", 0.0, 1.0);
-  add("--detection", detector.detection, "Of those, share in each frame", 0.0, 1.0);
+  add("--seen", detector.seen_share, "Share of the stems that a visit detects", 0.0, 1.0);
+  add("--detection", detector.detection, "Share of these stems that each frame detects", 0.0, 1.0);
   add("--false-stems", detector.false_per_frame, "Mean number of false stems per frame", 0.0, 1e3);
   add("--noise", detector.position_sigma_m,
       "Independent standard deviation of a position per axis [m]", 0.0, 5.0);
-  add("--diameter-noise", detector.diameter_sigma_share, "The same of a diameter, as its share",
-      0.0, 1.0);
+  add("--diameter-noise", detector.diameter_sigma_share,
+      "Standard deviation of a diameter, as a share of it", 0.0, 1.0);
   add("--tilt", detector.tilt_sigma_rad, "Standard deviation of roll and of pitch [rad]", 0.0, 0.5);
   add_view_option(command, detector.view_rad);
   add("--least-diameter", detector.least_diameter_m, "Thinner stems are not detected [m]", 0.0,
@@ -144,22 +144,25 @@ void add_stem_frames_simulation(CLI::App& sim) {
       "stem-frames", "A drive through a surveyed forest as a folder of detected stems");
   auto options = std::make_shared<StemSimulationOptions>();
   command->add_option("map", options->map, "CSV file with x_m,y_m[,dbh_m]")->required();
-  command->add_option("--dbh-cm", options->dbh_cm,
-                      "Column with diameters in cm, where there is no dbh_m; rows without are left "
-                      "out");
+  command->add_option(
+      "--dbh-cm", options->dbh_cm,
+      "Column with diameters in cm, if there is no dbh_m; rows without a diameter are left out");
   command->add_option("--out", options->out, "The folder to write")->required();
   command
       ->add_option(
           "--path", options->path,
-          fmt::format("{}, or a recorded way (CSV with x_m,y_m, or TUM), shrunk to the map",
-                      fmt::join(sim::stem_way_names(), ", ")))
+          fmt::format(
+              "{}, or a recorded path (CSV with x_m,y_m, or TUM), scaled down to fit the map",
+              fmt::join(sim::stem_way_names(), ", ")))
       ->capture_default_str();
-  command->add_option("--length", options->length_m, "Of the path, where it is not recorded [m]")
+  command
+      ->add_option("--length", options->length_m,
+                   "Length of the path, if it is not a recorded one [m]")
       ->check(CLI::Range(20.0, 1e5))
       ->capture_default_str();
 
   sim::StemDriveParameters& drive = options->drive;
-  command->add_option("--spacing", drive.spacing_m, "Between frames [m]")
+  command->add_option("--spacing", drive.spacing_m, "Path length between frames [m]")
       ->check(CLI::Range(0.05, 100.0))
       ->capture_default_str();
   command->add_option("--speed", drive.speed_mps, "Speed [m/s]")
@@ -167,10 +170,12 @@ void add_stem_frames_simulation(CLI::App& sim) {
       ->capture_default_str();
   command
       ->add_option("--visit-gap-s", drive.visit_gap_s,
-                   "A stem out of range for so long is visited anew [s]")
+                   "Time out of range after which a stem counts as a new visit [s]")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  command->add_option("--visit", drive.visit, "The same drive on another day: another number")
+  command
+      ->add_option("--visit", drive.visit,
+                   "Number of the visit; another number is the same drive on another day")
       ->check(CLI::Range(0, 10000))
       ->capture_default_str();
   command
@@ -180,7 +185,7 @@ void add_stem_frames_simulation(CLI::App& sim) {
       ->capture_default_str();
   command
       ->add_option("--stems-in-view", drive.stems_in_view,
-                   "The forest is thinned to so many stems in view on average; 0 = as it is")
+                   "Thin the forest to this mean number of stems in view; 0 = do not thin it")
       ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
   add_detector_options(*command, drive.detector);

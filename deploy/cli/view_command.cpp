@@ -225,13 +225,15 @@ void add_view_command(CLI::App& parent) {
   command->add_option("logs", options->logs, "One or two LCM logs with the outputs of a run")
       ->expected(0, 2);
   command->add_option("--map", options->map, "A map file (see `understory map`)");
-  command->add_option("--port", options->page.port, "Or one of the nine above it; 0: any free one")
+  command
+      ->add_option("--port", options->page.port,
+                   "Port of the page, or one of the nine above it; 0: any free port")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
-  command->add_option("--rate", options->rate, "Times faster than it was recorded")
+  command->add_option("--rate", options->rate, "Speed of the playback, as a multiple of real time")
       ->check(CLI::Range(0.01, 1000.0))
       ->capture_default_str();
-  command->add_flag("--paused", options->is_paused, "Stand at the beginning");
+  command->add_flag("--paused", options->is_paused, "Start paused at the beginning");
   command->callback([options] { view(*options); });
 }
 

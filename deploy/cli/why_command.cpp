@@ -152,9 +152,9 @@ void add_why(CLI::App& why, const char* name, const char* description, const cha
 void add_why_command(CLI::App& parent) {
   auto* why = parent.add_subcommand("why", "How a landmark or a pose of a log came about");
   why->require_subcommand(1);
-  add_why(*why, "landmark", "Where it comes from, who saw it, what became of it", "id",
-          "As in MAP, or MAP:NUMBER", why_landmark);
-  add_why(*why, "pose", "The messages that made it, back to the sensor", "utime",
+  add_why(*why, "landmark", "Origin, observations and state of a landmark", "id",
+          "Id as in MAP, or MAP:NUMBER", why_landmark);
+  add_why(*why, "pose", "The messages from which a pose was made, back to the sensor", "utime",
           "Stamp in us, seconds with a decimal point, last, worst (sigma) or slowest", why_pose);
 }
 

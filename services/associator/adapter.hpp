@@ -11,7 +11,7 @@ namespace understory::associator {
 struct AssociatorChannels {
   bus::ChannelList all;
   std::string landmarks = all.in("LANDMARKS", "detections of one sweep");
-  std::string odometry = all.in("ODOMETRY", "motion without landmarks, where there is any");
+  std::string odometry = all.in("ODOMETRY", "motion without landmarks, if available");
   std::string filter_pose = all.in("EKF_POSE", "pose of the filter, one sweep behind");
   std::string tracked_landmarks =
       all.out("TRACKED_LANDMARKS", "the consistent detections, with track ids");

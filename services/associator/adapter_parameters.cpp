@@ -14,11 +14,11 @@ void describe(AssociatorParameters& p, bus::ParameterTable& table) {
             "Half width of the gate of a pair.");
 
   table.add("motion_sigma_m", p.motion_sigma_m, {1e-4, 100.0}, "m",
-            "Standard deviation per axis of the step between two scans that nothing measures.");
+            "Standard deviation per axis of the step between two scans, without odometry.");
   table.add("motion_sigma_rad", p.motion_sigma_rad, {1e-5, 3.2}, "rad",
-            "Standard deviation of the rotation between two scans that nothing measures.");
+            "Standard deviation of the rotation between two scans, without odometry.");
   table.add("max_rotation_rad", p.max_rotation_rad, {0.0, 3.2}, "rad",
-            "Largest unpredicted rotation between two scans that is searched.");
+            "Largest rotation between two scans that is searched, without odometry.");
 
   table.add(
       "min_matched_ratio", p.min_matched_ratio, {0.0, 1.0}, "",
@@ -28,26 +28,27 @@ void describe(AssociatorParameters& p, bus::ParameterTable& table) {
             "Least number of matches of a scan that fits.");
 
   table.add("confirm_matches", p.confirm_matches, {1, 63}, "scans",
-            "[k] A track gets its id after so many matches ...");
+            "[k] A track gets its id after this many matches ...");
   table.add("confirm_window", p.confirm_window, {1, 63}, "scans",
-            "[n] ... within so many scans that had it in view.");
+            "[n] ... within this many scans that had it in view.");
 
   table.add("max_misfits", p.max_misfits, {0, 1000}, "scans",
-            "Scans in a row that fit no track and are passed over; then all tracks begin anew.");
-  table.add("max_missed", p.max_missed, {1, 100000}, "scans",
-            "A track ends after so many scans in a row that had it in view and did not match it.");
+            "Consecutive scans that fit no track and are skipped; then all tracks start again.");
+  table.add(
+      "max_missed", p.max_missed, {1, 100000}, "scans",
+      "A track ends after this many consecutive scans that had it in view and did not match it.");
   table.add("keep_range_factor", p.keep_range_factor, {1.0, 10.0}, "of the range",
             "Tracks beyond this multiple of the sensor's range end.");
 
   table.add("min_likelihood_ratio", p.min_likelihood_ratio, {1.0, 1e9}, "",
-            "A match is published if it is so many times likelier than any other pairing.");
+            "A match is published if it is this many times likelier than any other pairing.");
   table.add("walking_mps", p.walking_mps, {0.0, 100.0}, "m/s",
             "A track that moves against wheels and gyro is not published. Where fewer than three "
             "stationary tracks are in view, a track is published once this speed would have been "
             "noticed. 0: no check.");
   table.add("input.max_detections", p.max_detections, {1, 1000000}, "",
-            "LANDMARKS with more detections is refused and counted (too_large): what a message may "
-            "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
+            "LANDMARKS with more detections is refused and counted (too_large): this bounds the "
+            "cost of a message. A laser of 2048 columns cannot show 700 trunks.");
 
   describe(p.noise, table);
 

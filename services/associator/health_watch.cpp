@@ -6,16 +6,15 @@ namespace understory::associator {
 
 void describe(HealthParameters& p, bus::ParameterTable& table) {
   table.add("health.min_detections", p.min_detections, {1, 10000}, "",
-            "A scan with fewer detections says nothing about the associator.");
+            "Scans with fewer detections are not judged.");
   table.add("health.first_within_scans", p.first_within_scans, {0, 1000000}, "scans",
-            "From the start so many scans with detections are given for the first association.");
-  describe(p.lost, "lost", "scans", "bad are those of which nothing could be associated.", table);
-  describe(p.refused, "refused", "scans", "bad are those that came late or twice.", table);
-  describe(
-      p.misstated, "misstated", "scans",
-      "bad are those whose stated noise is replaced by what the scans show, until that is settled "
-      "(200 scans without a change).",
-      table);
+            "Scans with detections from the start within which the first association must come.");
+  describe(p.lost, "lost", "scans", "those without an association.", table);
+  describe(p.refused, "refused", "scans", "those that came late or twice.", table);
+  describe(p.misstated, "misstated", "scans",
+           "those whose stated noise is replaced by the learned one, until that is settled (200 "
+           "scans without a change).",
+           table);
 }
 
 HealthWatch::HealthWatch(const HealthParameters& parameters)

@@ -13,8 +13,8 @@ void describe(EkfPriorParameters& p, bus::ParameterTable& table) {
       "Standard deviation of the accelerometer's bias before the first measurement, the level's "
       "error included.");
   table.add("prior.wait_s", p.wait_s, {0.0, 60.0}, "s",
-            "With an IMU the map begins where the vehicle is found to be stationary, or to move by "
-            "its wheels, but after this time at the latest.");
+            "With an IMU the map begins when the vehicle is known to be stationary, or its wheels "
+            "move, and after this time at the latest.");
 }
 
 void describe(EkfMotionParameters& p, bus::ParameterTable& table) {
@@ -25,9 +25,9 @@ void describe(EkfMotionParameters& p, bus::ParameterTable& table) {
   table.add("motion.stationary_sigma_mps", p.stationary_sigma_mps, {1e-5, 1.0}, "m/s",
             "Standard deviation of the velocity of a stationary vehicle.");
   table.add("motion.stationary_sigma_m", p.stationary_sigma_m, {1e-6, 1.0}, "m",
-            "Standard deviation of the body's sway about the place where it is parked, per axis.");
+            "Standard deviation of the position of the parked body (sway), per axis.");
   table.add("motion.stationary_sigma_rad", p.stationary_sigma_rad, {1e-7, 0.1}, "rad",
-            "Standard deviation of the body's sway about its heading where it is parked.");
+            "Standard deviation of the heading of the parked body (sway).");
   table.add(
       "motion.sideways_sigma_mps", p.sideways_sigma_mps, {0.0, 100.0}, "m/s",
       "Standard deviation of the velocity across the vehicle, per odometry increment; 0 = it may "
@@ -47,10 +47,10 @@ void describe(EkfMapParameters& p, bus::ParameterTable& table) {
   table.add("map.keep_range_factor", p.keep_range_factor, {1.0, 10.0}, "of the range",
             "Landmarks farther than this times the sensor's range leave the active state.");
   table.add("map.max_missed", p.max_missed, {1, 1000000}, "scans",
-            "Consecutive scans that should have observed a landmark and did not, after which it "
-            "leaves.");
+            "A landmark leaves after this many consecutive scans that should have observed it and "
+            "did not.");
   table.add("map.max_refused", p.max_refused, {1, 1000000}, "scans",
-            "Consecutive scans in which its gate refused a landmark, after which it leaves.");
+            "A landmark leaves after this many consecutive scans in which its gate refused it.");
 }
 
 void describe(EkfObservationParameters& p, bus::ParameterTable& table) {
@@ -93,19 +93,19 @@ void describe(EkfRestartParameters& p, bus::ParameterTable& table) {
       "A longer interval without odometry and scans is announced as a restart, also where the "
       "map is kept.");
   table.add("restart.clock_jump_s", p.clock_jump_s, {0.1, 1e6}, "s",
-            "A stamp that is earlier than the latest one by more starts the clock anew.");
+            "A stamp that is earlier than the latest one by more than this restarts the clock.");
 }
 
 }  // namespace
 
 void describe(EkfParameters& parameters, bus::ParameterTable& table) {
   table.add("error_form", parameters.error_form, {"right_invariant", "first_estimate", "plain"},
-            "How errors are measured; plain becomes too certain of the heading.");
+            "Form of the error state; plain underestimates the covariance of the heading.");
   table.add("max_scan_delay_s", parameters.max_scan_delay_s, {0.0, 10.0}, "s",
             "Longest time that odometry waits for the scan at its end.");
   table.add("input.max_detections", parameters.max_detections, {1, 1000000}, "",
-            "TRACKED_LANDMARKS with more detections is refused and counted (too_large): what a "
-            "message may cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
+            "TRACKED_LANDMARKS with more detections is refused and counted (too_large): this "
+            "bounds the cost of a message. A laser of 2048 columns cannot show 700 trunks.");
   describe(parameters.prior, table);
   describe(parameters.motion, table);
   describe(parameters.map, table);

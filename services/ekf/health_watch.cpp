@@ -15,21 +15,18 @@ std::uint64_t refused_messages(const EkfCounters& counters) {
 
 void describe(HealthParameters& p, bus::ParameterTable& table) {
   table.add("health.min_observations", p.min_observations, {1, 10000}, "",
-            "A scan with fewer landmarks says nothing about them.");
-  table.add(
-      "health.lost_sigma_m", p.lost_sigma_m, {0.01, 1e6}, "m",
-      "With a larger standard deviation of the position the filter is lost, unless its map began "
-      "with one.");
-  table.add(
-      "health.nis_sigmas", p.nis_sigmas, {1.0, 100.0}, "sigma",
-      "A scan's innovations are too large where their squared distance exceeds its expectation "
-      "by so many standard deviations ...");
+            "Scans with fewer landmarks are not judged.");
+  table.add("health.lost_sigma_m", p.lost_sigma_m, {0.01, 1e6}, "m",
+            "The filter is lost with a larger standard deviation of the position, unless its map "
+            "began with such a one.");
+  table.add("health.nis_sigmas", p.nis_sigmas, {1.0, 100.0}, "sigma",
+            "A scan's innovations are too large if their squared distance exceeds its expectation "
+            "by this many standard deviations ...");
   table.add("health.nis_ratio", p.nis_ratio, {1.0, 1000.0}, "", "... and by this factor.");
-  describe(p.lost, "lost", "scans", "bad are those of which no landmark is used.", table);
-  describe(p.diverged, "diverged", "scans", "bad are those with too large innovations.", table);
-  describe(p.restarted, "restarted", "scans", "bad are those since which the filter began anew.",
-           table);
-  describe(p.refused, "refused", "messages", "bad are those that are late or broken.", table);
+  describe(p.lost, "lost", "scans", "those without a used landmark.", table);
+  describe(p.diverged, "diverged", "scans", "those with too large innovations.", table);
+  describe(p.restarted, "restarted", "scans", "those after which the filter restarted.", table);
+  describe(p.refused, "refused", "messages", "those that are late or malformed.", table);
 }
 
 HealthWatch::HealthWatch(const HealthParameters& parameters)

@@ -30,13 +30,14 @@ class TrackerAdapter : public bus::Adapter {
   void describe(bus::ParameterTable& table) override {
     existence_tracker::describe(parameters_, table);
     table.add("input.map_file", input_.map_file, {},
-              "Map file to begin with, the mapper's (see understory map); what its landmarks' "
-              "existence states say goes on.");
-    table.add("input.map_id", input_.map_id, {0, 32767}, "", "Which of its maps; 0: the only one.");
+              "Map file to begin with, the same as the mapper's (see understory map); the "
+              "existence states of its landmarks are continued.");
+    table.add("input.map_id", input_.map_id, {0, 32767}, "",
+              "Number of the map in that file; 0: the only one.");
     table.add("input.max_map_landmarks", input_.max_map_landmarks, {1, 10'000'000}, "",
               "Larger maps are refused.");
     bus::describe(limits_, "missing", "keyframes",
-                  "bad are those of whose landmarks a place is not known.", table);
+                  "those with a landmark whose position is not known.", table);
   }
 
   void bind(bus::Node& node) override {

@@ -17,7 +17,7 @@ struct TrackerChannels {
   std::string existence = all.out("EXISTENCE", "probability that each landmark exists");
   std::string existence_state =
       all.out("EXISTENCE_STATE", "state of each landmark, for the next drive");
-  std::string map_request = all.out("MAP_REQUEST", "asks for MAP where landmarks are not known");
+  std::string map_request = all.out("MAP_REQUEST", "request for MAP if landmarks are not known");
 };
 
 /// The service: its name, its channels and the factory of its adapter. The stage is made when the

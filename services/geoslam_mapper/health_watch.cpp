@@ -12,21 +12,18 @@ constexpr int kDoubtfulKeyframes = 50;
 }  // namespace
 
 void describe(HealthParameters& p, bus::ParameterTable& table) {
-  table.add(
-      "health.innovation_sigmas", p.innovation_sigmas, {1.0, 100.0}, "sigma",
-      "A keyframe fits badly where the chi^2 of its associations exceeds its expectation by so "
-      "many standard deviations.");
+  table.add("health.innovation_sigmas", p.innovation_sigmas, {1.0, 100.0}, "sigma",
+            "A keyframe fits badly if the chi^2 of its associations exceeds its expectation by "
+            "this many standard deviations.");
   table.add("health.filter_disagreement_m", p.filter_disagreement_m, {0.01, 1000.0}, "m",
             "Two keyframes contradict the filter where the motion between them differs by more.");
-  describe(p.lost, "lost", "keyframes", "bad are those without a certain pose.", table);
-  describe(p.rolled_back, "rolled_back", "keyframes", "bad are those that were rolled back.",
-           table);
+  describe(p.lost, "lost", "keyframes", "those without a certain pose.", table);
+  describe(p.rolled_back, "rolled_back", "keyframes", "those that were rolled back.", table);
   describe(p.diverged, "diverged", "keyframes",
-           "bad are those that fit badly; the same for those that contradict the filter.", table);
-  describe(p.refused, "refused", "keyframes", "bad are those that are malformed or late.", table);
-  describe(p.coasting, "coasting", "scans", "bad are those whose pose is by odometry alone.",
-           table);
-  describe(p.new_map, "new_map", "keyframes", "bad are those that began a map beside another one.",
+           "those that fit badly; separately, those that contradict the filter.", table);
+  describe(p.refused, "refused", "keyframes", "those that are malformed or late.", table);
+  describe(p.coasting, "coasting", "scans", "those whose pose is from odometry only.", table);
+  describe(p.new_map, "new_map", "keyframes", "those that started a map beside another one.",
            table);
 }
 

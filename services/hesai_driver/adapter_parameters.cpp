@@ -8,12 +8,12 @@ void describe(HesaiDriverParameters& p, bus::ParameterTable& table) {
   });
   table.add("sensor.model", p.sensor.model,
             {"pandar40p", "pandar64", "pandarqt", "xt16", "xt32", "xt32m2x"},
-            "What the packets are of.");
+            "Model of the laser.");
   table.add("sensor.angle_file", p.sensor.angle_file, {},
             "The sensor's own angle correction file (CSV); empty: the model's nominal angles.");
   lidar_driver::describe(p.range, table);
   lidar_driver::describe(p.time, table,
-                         "Stamps: the laser's clock (PTP or GPS), or when packets came.");
+                         "Stamps: the laser's clock (PTP or GPS), or the time of reception.");
 }
 
 }  // namespace understory::hesai_driver

@@ -11,9 +11,9 @@ namespace understory::keyframer {
 struct KeyframerChannels {
   bus::ChannelList all;
   std::string landmarks = all.in("LANDMARKS", "detections of one sweep");
-  std::string odometry = all.in("ODOMETRY", "motion without landmarks, where there is any");
+  std::string odometry = all.in("ODOMETRY", "motion without landmarks, if available");
   std::string ekf_level =
-      all.in("EKF_LEVEL", "error of roll and pitch of the sweeps, where a filter runs");
+      all.in("EKF_LEVEL", "error of roll and pitch of the sweeps, if a filter runs");
   std::string keyframe = all.out("KEYFRAME", "local landmarks of n sweeps");
 };
 

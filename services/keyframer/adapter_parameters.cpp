@@ -11,30 +11,28 @@ void describe_joint(JointKeyframerParameters& p, bus::ParameterTable& table) {
   table.add("joint.gate_sigmas", p.gate_sigmas, {0.1, 100.0}, "sigma",
             "Half width of the association gate.");
 
-  table.add(
-      "joint.motion_sigma_m", p.motion_sigma_m, {1e-4, 100.0}, "m",
-      "Standard deviation per axis of the step between two scans, where there is no odometry.");
+  table.add("joint.motion_sigma_m", p.motion_sigma_m, {1e-4, 100.0}, "m",
+            "Standard deviation per axis of the step between two scans, without odometry.");
   table.add("joint.motion_sigma_rad", p.motion_sigma_rad, {1e-5, 3.2}, "rad",
-            "Standard deviation of the rotation between two scans, where there is no odometry.");
+            "Standard deviation of the rotation between two scans, without odometry.");
   table.add("joint.max_rotation_rad", p.max_rotation_rad, {0.0, 3.2}, "rad",
-            "Largest unpredicted rotation between two scans that is searched.");
+            "Largest rotation between two scans that is searched, without odometry.");
   table.add("joint.min_matched_ratio", p.min_matched_ratio, {0.0, 1.0}, "",
             "Least share of the detections (or of the landmarks in view, if fewer) that a scan "
-            "without odometry must match; below it tracking starts anew.");
+            "without odometry must match; below it tracking starts again.");
   table.add("joint.min_matched", p.min_matched, {1, 1000}, "",
             "Least number of matches of a scan without odometry.");
-  table.add(
-      "joint.min_observations", p.min_observations, {1, 1000}, "scans",
-      "Least number of scans that detected a landmark of a keyframe (all, where tracking began "
-      "fewer scans ago).");
+  table.add("joint.min_observations", p.min_observations, {1, 1000}, "scans",
+            "Least number of scans that detected a landmark of a keyframe (all scans, if tracking "
+            "has had fewer).");
 }
 
 }  // namespace
 
 void describe(KeyframerParameters& parameters, bus::ParameterTable& table) {
   table.add("input.max_detections", parameters.max_detections, {1, 1000000}, "",
-            "LANDMARKS with more detections is refused and counted (too_large): what a message may "
-            "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
+            "LANDMARKS with more detections is refused and counted (too_large): this bounds the "
+            "cost of a message. A laser of 2048 columns cannot show 700 trunks.");
   describe_joint(parameters.joint, table);
   describe(parameters.joint.noise, table);
 

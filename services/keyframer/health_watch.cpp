@@ -21,39 +21,40 @@ bool either(const InputQuality& quality, const Judge& judge) {
 
 void describe(HealthParameters& p, bus::ParameterTable& table) {
   table.add("health.min_detections", p.min_detections, {1, 10000}, "",
-            "A scan with fewer detections says nothing about the keyframer.");
-  table.add("health.keyframe_within_scans", p.keyframe_within_scans, {1, 1000000}, "scans",
-            "Without a keyframe for so many scans with detections each further one is bad, too.");
+            "Scans with fewer detections are not judged.");
+  table.add(
+      "health.keyframe_within_scans", p.keyframe_within_scans, {1, 1000000}, "scans",
+      "After this many scans with detections and without a keyframe each further one is bad, too.");
 
-  describe(p.lost, "lost", "scans", "bad are those at which tracking began anew.", table);
-  describe(p.withheld, "withheld", "keyframes", "bad are those that were withheld.", table);
-  describe(p.refused, "refused", "scans", "bad are those that came late or twice.", table);
+  describe(p.lost, "lost", "scans", "those at which tracking started again.", table);
+  describe(p.withheld, "withheld", "keyframes", "those that were withheld.", table);
+  describe(p.refused, "refused", "scans", "those that came late or twice.", table);
   describe(
       p.misstated, "misstated", "scans",
-      "bad are those whose stated noise is replaced by what the scans show, until that is settled "
-      "(200 scans without a change), and those at which "
-      "landmarks and wheels contradict each other.",
+      "those whose stated noise is replaced by the learned one, until that is settled (200 scans "
+      "without a change), and those at which landmarks and wheels contradict each other.",
       table);
   describe(p.jumped, "jumped", "scans",
-           "bad are those whose step by landmarks is not that by wheels, by far more than both "
-           "allow, and those of which next to nothing matches where odometry places them.",
+           "those whose steps by landmarks and by wheels differ by far more than both allow, and "
+           "those with almost no match at the pose by odometry.",
            table);
 
   table.add("health.max_yaw_error_rad", p.max_yaw_error_rad, {0.001, 3.2}, "rad",
-            "Yaw of the landmarks' frame against the way by wheels from which the mounting is "
-            "called wrong.");
-  table.add("health.max_place_error_m", p.max_place_error_m, {0.001, 100.0}, "m",
-            "Place of the landmarks' frame against the way by wheels, along either axis, from "
-            "which the mounting is called wrong. Scans are called late or early if they are so by "
-            "the time in which the vehicle moves so far, or turns by the largest yaw error.");
+            "Yaw error of the landmarks' frame against the motion of the wheels from which the "
+            "mounting is reported as wrong.");
+  table.add(
+      "health.max_place_error_m", p.max_place_error_m, {0.001, 100.0}, "m",
+      "Position error of the landmarks' frame against the motion of the wheels, along either axis, "
+      "from which the mounting is reported as wrong. Scans are reported as late or early from the "
+      "time in which the vehicle moves by this, or turns by the largest yaw error.");
   table.add("health.max_scale_error", p.max_scale_error, {0.001, 1.0}, "",
-            "Share by which the way by wheels differs from that by landmarks from which the wheel "
-            "scale is called wrong.");
+            "Relative difference of distances by wheels and by landmarks from which the wheel "
+            "scale is reported as wrong.");
   table.add("health.max_turn_chi2", p.max_turn_chi2, {1.0, 1000.0}, "",
-            "Mean square of the difference between turns by landmarks and by gyro, by its stated "
-            "variance, from which scans are called shaken.");
+            "Mean square of the difference between rotations by landmarks and by gyro, by its "
+            "stated variance, from which scans are reported as shaken.");
   table.add("health.calibration_sigmas", p.calibration_sigmas, {1.0, 100.0}, "sigma",
-            "Such an error counts beyond so many of its standard deviations.");
+            "Such an error is reported if it exceeds this many of its standard deviations.");
 }
 
 HealthWatch::HealthWatch(const HealthParameters& parameters)

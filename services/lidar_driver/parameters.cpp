@@ -14,15 +14,15 @@ void describe_port(const std::string& key, int& port, bus::ParameterTable& table
 
 void describe(RangeParameters& p, bus::ParameterTable& table) {
   table.add("sensor.max_range_m", p.max_range_m, {0.0, 1000.0}, "m",
-            "Returns from farther are left out; 0: the model's range.");
+            "Farther returns are left out; 0: the model's range.");
   table.add("sensor.silence_s", p.silence_s, {0.01, 3600.0}, "s",
-            "Without a good packet for so long the sensor counts as silent.");
+            "Time without a valid packet after which the sensor is silent.");
 }
 
 void describe(TimeParameters& p, bus::ParameterTable& table, const std::string& sources) {
   table.add("time.source", p.source, {"sensor", "received"}, sources);
   table.add("time.tolerance_s", p.tolerance_s, {1e-4, 3600.0}, "s",
-            "With source \"sensor\": a clock farther from the computer's is reported.");
+            "With source \"sensor\": a larger difference from the computer's clock is reported.");
 }
 
 void check_addresses(const NetworkParameters& network) {

@@ -34,10 +34,10 @@ void describe(NetworkParameters& p, bus::ParameterTable& table, Ports ports) {
   table.add("network.bind_address", p.bind_address, {},
             "This computer's IPv4 address to listen on; 0.0.0.0: all, and broadcasts.");
   table.add("network.sensor_address", p.sensor_address, {},
-            "The sensor's IPv4 address; empty: whoever speaks first.");
+            "The sensor's IPv4 address; empty: the first sender.");
   ports();
   table.add("network.receive_buffer_bytes", p.receive_buffer_bytes, {4096, 1073741824}, "bytes",
-            "Asked of the kernel, which gives at most net.core.rmem_max.");
+            "Receive buffer; the kernel grants at most net.core.rmem_max.");
 }
 /// Adds a UDP port.
 void describe_port(const std::string& key, int& port, bus::ParameterTable& table);

@@ -24,7 +24,7 @@ struct LidarImuInputChannels {
   std::string gnss = all.out("GNSS", "checked");
   std::string odometry = all.out("ODOMETRY", "motion without landmarks");
   std::string rest_level =
-      all.out("REST_LEVEL", "level of the vehicle at rest, as motion showed it");
+      all.out("REST_LEVEL", "level error of the stationary vehicle, learned from motion");
   std::string raw_pose = all.out("RAW_POSE", "dead reckoning");
   std::string lidar_sweep = all.out("LIDAR_SWEEP", "de-skewed sweeps with attitude, in parts");
   std::string lidar_scan = all.out("LIDAR_SCAN", "scans of the one-plane laser, checked");

@@ -32,7 +32,7 @@ void describe_imu(ImuParameters& p, bus::ParameterTable& table) {
   table.add("imu.gyro_scale_sigma", p.gyro_scale_sigma, {0.0, 0.5}, "",
             "Relative error of the rate.");
   table.add("imu.level_noise", p.level_noise, {0.0, 10.0}, "m/s^2/sqrt(Hz)",
-            "Of removed gravity, from errors of the level.");
+            "Error of the removed gravity, from errors of the level.");
   table.add("imu.gyro_range_rad_s", p.gyro_range_rad_s, {0.1, 1000.0}, "rad/s",
             "A rate this large is saturated.");
   table.add("imu.force_range_mps2", p.force_range_mps2, {10.0, 10000.0}, "m/s^2",
@@ -47,14 +47,15 @@ void describe_imu(ImuParameters& p, bus::ParameterTable& table) {
 
 void describe_wheels(WheelOdometryParameters& p, AxlePlace& axle, bus::ParameterTable& table) {
   WheelNoise& n = p.noise;
-  table.add("wheels.wheelbase_m", p.car.wheelbase_m, {0.1, 30.0}, "m", "From axle to axle.");
+  table.add("wheels.wheelbase_m", p.car.wheelbase_m, {0.1, 30.0}, "m", "Distance of the axles.");
   table.add("wheels.encoder_left_m", p.car.encoder_left_m, {-5.0, 5.0}, "m",
             "The wheel with the encoder, left of the middle of the rear axle.");
   table.add("wheels.axle_T_vehicle.x_m", axle.x_m, {-50.0, 50.0}, "m",
             "The vehicle's origin, forward of the middle of the rear axle.");
   table.add("wheels.axle_T_vehicle.y_m", axle.y_m, {-50.0, 50.0}, "m", "Left of it.");
   table.add("wheels.axle_T_vehicle.yaw_rad", axle.yaw_rad, {-3.2, 3.2}, "rad", "Rotation about z.");
-  table.add("wheels.max_gap_s", p.max_gap_s, {0.001, 10.0}, "s", "How long a sample holds.");
+  table.add("wheels.max_gap_s", p.max_gap_s, {0.001, 10.0}, "s",
+            "Longest time for which a sample is used.");
   table.add("wheels.speed_scale_sigma", n.speed_scale_sigma, {0.0, 1.0}, "",
             "Relative error of the speed.");
   table.add("wheels.steering_sigma_rad", n.steering_sigma_rad, {0.0, 1.0}, "rad",
@@ -75,7 +76,7 @@ void describe_wheels(WheelOdometryParameters& p, AxlePlace& axle, bus::Parameter
 
 void describe_standstill(StandstillParameters& p, bus::ParameterTable& table) {
   table.add("standstill.calibration_s", p.calibration_s, {0.0, 3600.0}, "s",
-            "A standstill this long, without a break, calibrates.");
+            "Uninterrupted standstill after which the IMU is calibrated.");
   table.add("standstill.window_s", p.window_s, {0.05, 10.0}, "s",
             "Length of the window of samples.");
   table.add("standstill.gyro_sigma_rad_s", p.gyro_sigma_rad_s, {0.0, 10.0}, "rad/s",
@@ -89,12 +90,12 @@ void describe_standstill(StandstillParameters& p, bus::ParameterTable& table) {
   table.add("standstill.floor_factor", p.floor_factor, {1.0, 1000.0}, "",
             "Largest spread, in units of that at the first standstill.");
   table.add("standstill.velocity_sigma_mps", p.velocity_sigma_mps, {1e-6, 10.0}, "m/s",
-            "Of velocity zero at a standstill, sigma.");
+            "Velocity at a standstill, sigma.");
 }
 
 void describe_constraint(ConstraintParameters& p, bus::ParameterTable& table) {
   table.add("constraint.nonholonomic", p.nonholonomic,
-            "Wheels do not slip sideways, nor leave the ground.");
+            "Assume that wheels neither slip sideways nor leave the ground.");
   table.add("constraint.side_slip_mps", p.side_slip_mps, {1e-6, 10.0}, "m/s",
             "Sideways velocity of the axle, sigma.");
   table.add("constraint.side_slip_scale", p.side_slip_scale, {0.0, 1.0}, "",
@@ -104,45 +105,48 @@ void describe_constraint(ConstraintParameters& p, bus::ParameterTable& table) {
   table.add("constraint.vertical_scale", p.vertical_scale, {0.0, 1.0}, "",
             "The same, part of the speed.");
   table.add("constraint.typical_speed_mps", p.typical_speed_mps, {0.1, 1000.0}, "m/s",
-            "Bounds the velocity where no wheels measure it.");
+            "Bounds the velocity without wheels.");
   table.add("constraint.wheel_sigma_mps", p.wheel_sigma_mps, {1e-6, 10.0}, "m/s",
-            "Of the wheels' speed, for the attitude, sigma.");
-  table.add("constraint.period_s", p.period_s, {0.001, 10.0}, "s", "Between two uses.");
+            "Wheel speed, as used for the attitude, sigma.");
+  table.add("constraint.period_s", p.period_s, {0.001, 10.0}, "s",
+            "Time between two uses of the constraints.");
 }
 
 void describe_output(OutputParameters& p, bus::ParameterTable& table) {
   table.add("output.max_increment_s", p.max_increment_s, {0.005, 60.0}, "s",
             "Longest increment of ODOMETRY.");
   table.add("output.lag_s", p.lag_s, {0.0, 10.0}, "s",
-            "How long an increment waits for a sweep to end it.");
+            "Time that an increment waits for a sweep at its end.");
   table.add("output.max_wait_s", p.max_wait_s, {0.0, 10.0}, "s",
-            "How long a sweep waits for motion.");
+            "Time that a sweep waits for the motion.");
   table.add("output.raw_pose_period_s", p.raw_pose_period_s, {0.0, 10.0}, "s",
-            "Between two RAW_POSE.");
+            "Time between two RAW_POSE.");
   table.add("output.correction_delay_s", p.correction_delay_s, {0.0, 10.0}, "s",
-            "From a VELOCITY_CORRECTION's stamp to its effect.");
+            "Time from the stamp of a VELOCITY_CORRECTION to its effect.");
   table.add("output.velocity_correlation_s", p.velocity_correlation_s, {0.0, 1000.0}, "s",
             "Correlation time of the error of dead-reckoned velocity.");
 }
 
 void describe_fault(FaultParameters& p, bus::ParameterTable& table) {
-  table.add("fault.silent_s", p.silent_s, {0.01, 60.0}, "s", "IMU or wheels without a sample.");
-  table.add("fault.sweep_silent_s", p.sweep_silent_s, {0.01, 60.0}, "s", "Lasers without a sweep.");
+  table.add("fault.silent_s", p.silent_s, {0.01, 60.0}, "s",
+            "Time without a sample after which IMU or wheels are reported.");
+  table.add("fault.sweep_silent_s", p.sweep_silent_s, {0.01, 60.0}, "s",
+            "Time without a sweep after which lasers are reported.");
   table.add("fault.frozen_s", p.frozen_s, {0.01, 60.0}, "s",
-            "The same IMU sample again and again.");
+            "Time of identical IMU samples after which the IMU is reported.");
   table.add("fault.clock_jump_s", p.clock_jump_s, {0.01, 60.0}, "s",
-            "Stamps that go back, or lead the others, by more.");
+            "Stamps are reported if they go back, or lead the others, by more.");
   table.add("fault.resync_samples", p.resync_samples, {2, 1000}, "samples",
-            "Stamps that go on evenly, until a clock that jumped is followed.");
+            "Regular stamps after which a clock that jumped is followed.");
   table.add("fault.reorder_s", p.reorder_s, {0.0, 0.2}, "s",
-            "How long a sample waits for one before it that is missing.");
+            "Time that a sample waits for a missing one before it.");
 }
 
 void describe_expected(ExpectedSensors& p, bus::ParameterTable& table) {
   table.add("expected.imu", p.imu, "The vehicle has an IMU: HEALTH is not OK without RAW_IMU.");
-  table.add("expected.wheels", p.wheels, "The same of wheels, RAW_WHEELS.");
-  table.add("expected.sweep", p.sweep, "The same of a laser that scans in space, RAW_SWEEP.");
-  table.add("expected.scan", p.scan, "The same of a laser that scans one plane, RAW_SCAN.");
+  table.add("expected.wheels", p.wheels, "The same for wheels, RAW_WHEELS.");
+  table.add("expected.sweep", p.sweep, "The same for a 3-D laser, RAW_SWEEP.");
+  table.add("expected.scan", p.scan, "The same for a one-plane laser, RAW_SCAN.");
 }
 
 }  // namespace
@@ -154,11 +158,11 @@ void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
   describe_mount(parameters.lidar.mount, "lidar.mount", table);
   table.add("lidar.times_from_azimuth", parameters.lidar.times_from_azimuth,
             {"none", "clockwise", "counterclockwise"},
-            "Times for sweeps that have none: how the laser rotates, seen from above.");
+            "Times for sweeps without times: rotation of the laser, seen from above.");
   table.add("lidar.turns", parameters.lidar.turns, {"any", "clockwise", "counterclockwise"},
-            "How its points come, seen from above in its own frame; \"any\" is not checked.");
+            "Rotation of the laser, seen from above in its own frame; \"any\" is not checked.");
   table.add("lidar.revolution_s", parameters.lidar.revolution_s, {0.001, 1.0}, "s",
-            "Time of one revolution, for these.");
+            "Time of one revolution, for lidar.times_from_azimuth.");
   table.add("lidar.min_range_m", parameters.lidar.min_range_m, {0.0, 100.0}, "m",
             "Nearer points are on the vehicle itself.");
   describe_mount(parameters.planar.mount, "planar.mount", table);

@@ -14,7 +14,8 @@ struct LoopCloserChannels {
   std::string place_scan = all.in("PLACE_SCAN", "clouds, for detectors that compare clouds");
   std::string slam_update = all.in("SLAM_UPDATE", "pose of each keyframe in the map");
   std::string submap = all.in("SUBMAP", "keyframes that the mapper gave to the store");
-  std::string loop_result = all.in("LOOP_RESULT", "a closure was taken or refused, and why");
+  std::string loop_result =
+      all.in("LOOP_RESULT", "whether a closure was accepted or refused, and why");
   std::string loop_closure = all.out("LOOP_CLOSURE", "two places and their relative pose");
 };
 

@@ -8,26 +8,26 @@ namespace {
 
 void describe(PlaceParameters& p, bus::ParameterTable& table) {
   table.add("places.every_m", p.every_m, {0.1, 1000.0}, "m",
-            "Path from one place that is kept and looked for to the next.");
+            "Path length between places; each is kept and searched for.");
   table.add("places.window_m", p.window_m, {0.0, 200.0}, "m",
-            "What was seen on so much path counts for a place.");
+            "Path length whose detections belong to a place.");
   table.add("places.merge_m", p.merge_m, {0.0, 5.0}, "m",
-            "Detections of two keyframes nearer to each other are one stem, where the mapper does "
-            "not say.");
+            "Detections of two keyframes nearer to each other are one stem, if the mapper gives no "
+            "association.");
   table.add("places.min_stems", p.min_stems, {3, 10000}, "",
-            "A place with fewer stems is neither kept nor looked for.");
+            "A place with fewer stems is neither kept nor searched for.");
   table.add("places.most_stems", p.most_stems, {3, 10000}, "",
-            "Of more stems the nearest count: what a search costs follows from it.");
+            "Most stems of a place, the nearest; bounds the cost of a search.");
   table.add("places.min_loop_m", p.min_loop_m, {1.0, 1e5}, "m",
-            "Path that lies between two places of a loop at least. More than twice the sensor's "
-            "range: what is still in view is no loop.");
+            "Least path length between two places of a loop. More than twice the sensor's range: "
+            "landmarks still in view are no loop.");
   table.add("places.known_share", p.known_share, {0.0, 1.0}, "",
-            "Share of a keyframe's landmarks that are of earlier passes with which the mapper is "
-            "on known ground: nothing is kept, nothing looked for.");
+            "With this share of landmarks from earlier passes a keyframe is on known ground: no "
+            "place is kept or searched for.");
   table.add("places.error_m", p.error_m, {0.0, 10.0}, "m",
-            "Standard deviation per axis that the pose of a closure has beside what its stems "
-            "show: the keyframes of a place lie to each other as the mapper has them.");
-  table.add("places.error_rad", p.error_rad, {0.0, 1.0}, "rad", "The same of its heading.");
+            "Standard deviation per axis of a closure's pose, in addition to that from its stems: "
+            "relative poses of a place's keyframes are the mapper's.");
+  table.add("places.error_rad", p.error_rad, {0.0, 1.0}, "rad", "The same for its heading.");
 }
 
 std::vector<std::string> verifiers() {
@@ -39,51 +39,51 @@ std::vector<std::string> verifiers() {
 void describe(SearchParameters& p, bus::ParameterTable& table) {
   table.add(
       "search.detector", p.detector, place_recognition::detector_names(),
-      "Who finds places. stems: its score is a probability, set against what chance has; the "
-      "others only name candidates and need a verifier. range_histogram and scan_context compare "
+      "Method that finds places. stems: its score is a probability against a match by chance; the "
+      "others only give candidates and need a verifier. range_histogram and scan_context compare "
       "clouds: place_scan.period_s of landmark_extractor must not be 0.");
-  table.add(
-      "search.verifier", p.verifier, verifiers(),
-      "Who compares a found place in detail, and gives the pose. none: only with stems. Where "
-      "the detector is not stems the correspondence graph must agree with any other one. ICP and "
-      "scan_context compare clouds, as above; they say yes or no, and the pose is the other's.");
+  table.add("search.verifier", p.verifier, verifiers(),
+            "Method that verifies a found place and gives the pose. none: only with stems. If the "
+            "detector is not stems, the correspondence graph must agree with any other verifier. "
+            "ICP and scan_context compare clouds, as above; they only accept or reject, and the "
+            "pose is the other method's.");
   table.add("search.candidates", p.candidates, {1, 50}, "",
-            "So many candidates, the most alike, are verified.");
+            "Number of best candidates that are verified.");
   table.add("search.verified_pairs", p.verified_pairs, {3, 10000}, "",
-            "Least number of landmarks in common that a verifier must find. A count does not say "
-            "what chance gives: where stems stand denser, more.");
+            "Least number of common landmarks for a verifier. The number by chance is higher where "
+            "stems are denser: use more there.");
   table.add("search.verified_score", p.verified_score, {0.0, 1.0}, "",
-            "The same of a verifier that compares clouds: for ICP the share of the points that "
-            "have a partner, for scan_context one less the distance of two contexts.");
+            "The same for a verifier that compares clouds: for ICP the share of points with a "
+            "partner, for scan_context 1 - distance of two contexts.");
 }
 
 void describe(AcceptanceParameters& p, bus::ParameterTable& table) {
   table.add("accept.chance_decades", p.chance_decades, {0.0, 300.0}, "decades",
-            "A found place outside of what the mapper's poses allow: so much less than one pose is "
-            "expected to fit as well by chance, of all poses at all places.");
+            "For a place outside of the gate of the mapper's poses: least -log10 of the number of "
+            "poses, of all at all places, that are expected to fit as well by chance.");
   table.add("accept.chance_decades_expected", p.chance_decades_expected, {0.0, 300.0}, "decades",
-            "The same where the mapper's poses allow the place, of those poses that they allow.");
-  table.add("accept.margin_decades", p.margin_decades, {0.0, 300.0}, "decades",
-            "Likelihood of the found place over that of the next one that puts the vehicle "
-            "elsewhere.");
-  table.add("accept.min_pairs", p.min_pairs, {2, 10000}, "", "Least number of stems in common.");
+            "The same for a place inside of the gate, counting the poses inside of it.");
+  table.add(
+      "accept.margin_decades", p.margin_decades, {0.0, 300.0}, "decades",
+      "log10 of the likelihood of the found place over that of the next best pose elsewhere.");
+  table.add("accept.min_pairs", p.min_pairs, {2, 10000}, "", "Least number of common stems.");
   table.add("accept.gate_sigmas", p.gate_sigmas, {0.5, 100.0}, "sigma",
-            "What the mapper's poses allow: so many standard deviations of both places.");
+            "Gate of the mapper's poses, in standard deviations of both places.");
   table.add("accept.closed_m", p.closed_m, {0.0, 1e5}, "m",
-            "Path after an accepted closure on which no other one is looked for.");
+            "Path length after an accepted closure without a search.");
 }
 
 void describe(StemParameters& p, bus::ParameterTable& table) {
   table.add("stems.sigma_m", p.sigma_m, {0.001, 5.0}, "m",
-            "Standard deviation of the difference of a stem's positions of two visits, per axis.");
+            "Standard deviation of the difference of a stem's positions in two visits, per axis.");
   table.add("stems.matched_share", p.matched_share, {0.01, 0.99}, "",
-            "Of the stems in view of both visits, those that both detect.");
+            "Share of the stems in view of both visits that both detect.");
   table.add("stems.use_diameters", p.use_diameters, "Compare the stems' diameters, too.");
   table.add(
       "stems.diameter_sigma", p.diameter_sigma, {0.001, 5.0}, "",
-      "Standard deviation of the logarithm of the ratio of a stem's diameters of two visits.");
+      "Standard deviation of the logarithm of the ratio of a stem's diameters in two visits.");
   table.add("stems.triangles", p.triangles, {10.0, 10000.0}, "",
-            "Triangles of stems by which a place is found, about: 16 bytes each are kept.");
+            "Approximate number of stem triangles that describe a place, 16 bytes each.");
 }
 
 }  // namespace

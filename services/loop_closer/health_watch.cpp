@@ -3,13 +3,12 @@
 namespace understory::loop_closer {
 
 void describe(HealthParameters& p, bus::ParameterTable& table) {
-  describe(p.refused, "refused", "closures", "bad are those that the mapper refused.", table);
+  describe(p.refused, "refused", "closures", "those that the mapper refused.", table);
   describe(p.diverged, "diverged", "closures",
-           "bad are those that contradict the mapper's map and wait for others that agree.", table);
-  describe(p.missing, "missing", "keyframes",
-           "bad are those of which the mapper tells and that did not come.", table);
+           "those that contradict the mapper's map and wait for others that agree.", table);
+  describe(p.missing, "missing", "keyframes", "those in SLAM_UPDATE without a KEYFRAME.", table);
   describe(p.clouds, "clouds", "places",
-           "bad are those without a cloud, where detector or verifier compare clouds.", table);
+           "those without a cloud, if detector or verifier compare clouds.", table);
 }
 
 HealthWatch::HealthWatch(const HealthParameters& parameters)

@@ -13,7 +13,7 @@ bus::ChannelList shown_channels();
 /// The channels, declared once: `--help` and the diagram of services/README.md follow.
 struct ViewerChannels {
   bus::ChannelList all = shown_channels();
-  std::string map_request = all.out("MAP_REQUEST", "asks for MAP where the viewer started late");
+  std::string map_request = all.out("MAP_REQUEST", "request for MAP if the viewer started late");
 };
 
 /// The service. In a replay it receives and publishes nothing.

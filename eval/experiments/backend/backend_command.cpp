@@ -120,9 +120,10 @@ void add_backend_experiment(CLI::App& eval) {
   command.add_option("--data", options->files, "Graph files")->check(CLI::ExistingFile);
   command
       .add_option("--streets", options->world_poses,
-                  "Simulated street grids of so many poses besides")
+                  "Add simulated street grids with this number of poses")
       ->check(CLI::Range(2, 1'000'000));
-  command.add_option("--seed", options->seed, "Of the simulated ones")->capture_default_str();
+  command.add_option("--seed", options->seed, "Seed of the simulated graphs")
+      ->capture_default_str();
   command.add_option("--json", options->json, "Result file; times per update and plot beside it");
   command.add_flag("!--no-plots", options->plots, "Write JSON only");
   command.callback([options] { run_guarded("backend", [&] { run_experiment(*options); }); });

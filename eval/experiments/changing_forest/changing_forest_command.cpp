@@ -192,18 +192,18 @@ void add_changing_forest_experiment(CLI::App& eval) {
       "A forest mapped once and driven again while trees go and come, from raw LIDAR");
   const auto options = std::make_shared<DrivesCommand>();
   options->drives.forest.course.length_m = 150.0;
-  command.add_option("--part", options->part, "What happens: one part, or all")
+  command.add_option("--part", options->part, "Part of the experiment, or all")
       ->check(CLI::IsMember({"all", "changes", "stack", "false detections"}))
       ->capture_default_str();
-  add_number(command, "--runs", options->runs, 1, 1000, "Forests, each driven in every way");
+  add_number(command, "--runs", options->runs, 1, 1000, "Forests, each with every part");
   command.add_option("--seed", options->seed, "Seed of the first forest")->capture_default_str();
   add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
   add_number(command, "--drives", options->drives.forest.drives, 2, 100,
              "Drives; the first one maps");
   add_number(command, "--share", options->drives.forest.share, 0.0, 0.9,
-             "Of the trees felled between two");
+             "Share of the trees felled between two drives");
   add_number(command, "--length-m", options->drives.forest.course.length_m, 30.0, 10000.0,
-             "Of the path [m]");
+             "Length of the path [m]");
   command.add_option("--config", options->drives.config_dir, "Configuration folder of the chain")
       ->capture_default_str();
   command.add_option("--json", options->json, "Result document");

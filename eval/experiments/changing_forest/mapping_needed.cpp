@@ -174,7 +174,7 @@ void add_mapping_needed_experiment(CLI::App& eval) {
   command.add_option("--seed", options->seed, "Seed of the first forest")->capture_default_str();
   add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
   add_number(command, "--length-m", options->drives.forest.course.length_m, 30.0, 10000.0,
-             "Of the path [m]");
+             "Length of the path [m]");
   command.add_option("--config", options->drives.config_dir, "Configuration folder of the chain")
       ->capture_default_str();
   command.add_option("--json", options->json, "Result document");

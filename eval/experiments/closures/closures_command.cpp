@@ -237,12 +237,13 @@ void run(const ClosuresOptions& options) {
 
 void add_closures_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand(
-      "closures", "Right and wrong loop closures, and which of them known ways let count");
+      "closures", "True and false loop closures, and which of them known methods accept");
   const auto options = std::make_shared<ClosuresOptions>();
-  add_number(command, "--runs", options->runs, 1, 100000, "Drives of each sort");
+  add_number(command, "--runs", options->runs, 1, 100000, "Drives of each kind");
   add_number(command, "--plantations", options->plantations, 0, 1000,
-             "Drives in rows, of each regularity");
-  command.add_option("--seed", options->seed, "The others follow it")->capture_default_str();
+             "Drives in plantations, for each regularity of the rows");
+  command.add_option("--seed", options->seed, "First seed; the others follow it")
+      ->capture_default_str();
   add_number(command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command.add_option("--json", options->json, "Result document");
   command.callback([options] { run_guarded("closures", [options] { run(*options); }); });

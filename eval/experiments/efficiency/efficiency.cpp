@@ -220,7 +220,7 @@ void add_efficiency_experiment(CLI::App& eval) {
   add_number(command, "--stationary-h", options->stationary_h, 0.0, 1000.0,
              "Hours stationary; 0 = none");
   add_number(command, "--hand-over-m", options->hand_over_m, 0.0, 1e6,
-             "What is farther from the vehicle goes to the disk [m]; 0 = nothing");
+             "Map parts farther from the vehicle than this go to the disk [m]; 0 = none");
   command.callback([options] { run_guarded("efficiency", [&] { run_efficiency(*options); }); });
 }
 

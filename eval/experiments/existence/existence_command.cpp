@@ -89,7 +89,7 @@ void add_existence_experiment(CLI::App& eval) {
       .add_option("--seed", options->seed, "Seed of the first world; tuned on 100001 and 100002")
       ->capture_default_str();
   add_number(command, "--jobs", options->jobs, 1, 256, "Jobs side by side");
-  command.add_option("--only", options->only, "Some of the parts")->check(CLI::IsMember(kParts));
+  command.add_option("--only", options->only, "Only these parts")->check(CLI::IsMember(kParts));
   command.add_option("--data", options->data,
                      "Folder with stem_censuses and tree_existence; default $UNDERSTORY_DATA");
   command.add_option("--json", options->json, "Result document");

@@ -123,16 +123,17 @@ void add_few_landmarks_experiment(CLI::App& eval) {
       "A car park with two or three landmarks in a scan, wheels and a one-plane laser");
   const auto options = std::make_shared<FewLandmarksOptions>();
   add_number(command, "--seeds", options->seeds, 1, 1000, "Drives");
-  command.add_option("--first-seed", options->first_seed, "The others follow it")
+  command.add_option("--first-seed", options->first_seed, "First seed; the others follow it")
       ->capture_default_str();
 
   FewLandmarksDrive& plan = options->drive;
-  add_number(command, "--spacing-m", plan.spacing_m, 3.0, 100.0, "Between neighbouring trunks [m]");
-  add_number(command, "--length-m", plan.length_m, 50.0, 10000.0, "Of the circle [m]");
-  add_number(command, "--laps", plan.laps, 1, 100, "Rounds");
+  add_number(command, "--spacing-m", plan.spacing_m, 3.0, 100.0,
+             "Distance of neighbouring trunks [m]");
+  add_number(command, "--length-m", plan.length_m, 50.0, 10000.0, "Length of the circle [m]");
+  add_number(command, "--laps", plan.laps, 1, 100, "Laps");
   add_number(command, "--walkers", plan.walkers, 0, 1000, "People beside the path");
   add_number(command, "--wheel-scale", plan.wheel_scale, 0.0, 20.0,
-             "Errors of wheels and steering, by the simulation's usual ones");
+             "Errors of wheels and steering, as a multiple of the simulation's defaults");
 
   command.add_option("--config", plan.config_dir, "Configuration of the chain's services")
       ->capture_default_str();

@@ -150,7 +150,7 @@ void add_frontend_experiment(CLI::App& eval) {
   options->config_dir = "deploy/config/lidar";
 
   add_number(*command, "--runs", options->runs, 1, 100000,
-             "Runs of the filter; others follow from it");
+             "Runs of the filter; those of other parts follow from this number");
   command->add_option("--seed", options->seed, "Seed of everything");
   add_number(*command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
@@ -162,12 +162,9 @@ void add_frontend_experiment(CLI::App& eval) {
   command
       ->add_option("--only", options->sections,
                    "Parts of it, or drives of the chain (forest, urban, country, poles). Run only "
-                   "where named: "
-                   "planar (a laser with one plane while the vehicle turns), limit (the chain "
-                   "beside the batch "
-                   "solution), mismatch (the filter where sway and errors of the sensors are 0.5 "
-                   "and 2 times "
-                   "what it takes them for)")
+                   "if named: planar (a laser with one plane while the vehicle turns), limit (the "
+                   "chain beside the batch solution), mismatch (sway and sensor errors 0.5 and 2 "
+                   "times those of the filter's parameters)")
       ->check(
           CLI::IsMember({"extraction", "forest-plots", "tracking", "filter", "chain", "faults",
                          "forest", "urban", "country", "poles", "planar", "limit", "mismatch"}));

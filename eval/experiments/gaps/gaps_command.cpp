@@ -98,15 +98,17 @@ void add_gaps_experiment(CLI::App& eval) {
       "gaps",
       "A process that hangs or a sensor that is silent for 1.1 to 30 s: the poses after it");
   const auto options = std::make_shared<GapsOptions>();
-  add_number(command, "--seeds", options->seeds, 1, 1000, "Drives of each gap");
-  command.add_option("--first-seed", options->first_seed, "The others follow it")
+  add_number(command, "--seeds", options->seeds, 1, 1000, "Drives for each gap");
+  command.add_option("--first-seed", options->first_seed, "First seed; the others follow it")
       ->capture_default_str();
-  add_number(command, "--length-m", options->drive.length_m, 250.0, 100000.0, "Of a drive [m]");
+  add_number(command, "--length-m", options->drive.length_m, 250.0, 100000.0,
+             "Length of a drive [m]");
 
   command.add_option("--lidar", options->lidar, "vlp32 or vlp16")
       ->check(CLI::IsMember({"vlp32", "vlp16"}))
       ->capture_default_str();
-  command.add_option("--only", options->only, "Gaps with this in their name, and none");
+  command.add_option("--only", options->only,
+                     "Only gaps whose name contains this, and the drive without one");
   command
       .add_option("--config", options->drive.config_dir, "Configuration of the chain's services")
       ->capture_default_str();

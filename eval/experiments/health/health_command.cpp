@@ -100,12 +100,12 @@ void run(const HealthOptions& options) {
 
 void add_health_experiment(CLI::App& eval) {
   auto* command = eval.add_subcommand(
-      "health", "Does HEALTH say so where the pose is wrong, and nothing where it is right?");
+      "health", "Is HEALTH not OK where the pose is wrong, and OK where it is right?");
   auto options = std::make_shared<HealthOptions>();
   add_number(*command, "--drives", options->drives, 1, 100000,
              "Drives without a fault, and as many with one");
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
-  command->add_option("--only", options->only, "Only faults whose name has this in it");
+  command->add_option("--only", options->only, "Only faults whose name contains this");
   add_number(*command, "--jobs", options->jobs, 1, 1024, "Drives side by side");
   command->add_option("--json", options->json, "Result file");
   command->callback([options] { run_guarded("health", [&] { run(*options); }); });

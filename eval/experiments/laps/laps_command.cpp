@@ -123,22 +123,21 @@ void run(const LapsOptions& options) {
 
 void add_laps_experiment(CLI::App& eval) {
   auto* command = eval.add_subcommand(
-      "laps",
-      "The same way again and again, from raw LIDAR: memory, latency, accuracy, lap by lap");
+      "laps", "Many laps of one path, from raw LIDAR: memory, latency, accuracy, lap by lap");
   auto options = std::make_shared<LapsOptions>();
   add_number(*command, "--laps", options->laps, 2, 100000, "Laps from raw LIDAR");
   add_number(*command, "--length-m", options->length_m, 100.0, 100000.0, "Length of a lap [m]");
-  command->add_option("--beams", options->beams, "Of the LIDAR")
+  command->add_option("--beams", options->beams, "Beams of the LIDAR")
       ->check(CLI::IsMember({16, 32}))
       ->capture_default_str();
   add_number(*command, "--hours", options->hours, 0.0, 10000.0,
-             "Then so many hours of keyframer and mapper alone, from an empty map, with the "
-             "LANDMARKS and ODOMETRY of the last lap but one again and again");
+             "Then this many hours of only keyframer and mapper, from an empty map, with the "
+             "LANDMARKS and ODOMETRY of the last lap but one repeated");
   command->add_option("--localise-in", options->localise_in,
-                      "A map file: the map of the recorded lap is written to it, where it is not "
-                      "there, and the hours are localisation only in it");
+                      "Map file for the hours, which then only localise; if it does not exist, it "
+                      "gets the map of the recorded lap");
   command->add_option("--known-ground-m", options->known_ground_m,
-                      "Instead of smoothing.known_ground_m; 0: every keyframe is kept");
+                      "Value of smoothing.known_ground_m; 0: every keyframe is kept");
   command->add_option("--seed", options->seed, "Seed of everything")->capture_default_str();
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
   command->add_option("--json", options->json, "Result file; a plot goes beside it");

@@ -265,23 +265,23 @@ void add_loop_detectors_experiment(CLI::App& eval) {
       ->capture_default_str();
   command.add_flag(
       "--detectors-only", [options](std::int64_t) { options->verifiers.clear(); }, "No verifier");
-  add_number(command, "--queries", options->trial.most_queries, 1, 100000, "Of a set, at most");
+  add_number(command, "--queries", options->trial.most_queries, 1, 100000, "Most queries of a set");
   add_number(command, "--cloud-queries", options->trial.most_cloud_queries, 1, 100000,
-             "The same of a set with clouds of points");
+             "Most queries of a set with point clouds");
   add_number(command, "--drives", options->drives, 1, 1000,
              "Drives through each stem map, by seed");
   command.add_option("--threshold", options->threshold,
-                     "Scores above it are accepted, whatever the tuning sets say");
+                     "Least score that is accepted, instead of the tuned one");
   add_number(command, "--candidates", options->trial.candidates, 1, 50,
-             "Of a detector, that a verifier compares");
+             "Candidates of a detector that are verified");
   add_number(command, "--length-m", options->set.length_m, 200.0, 100000.0,
-             "Of simulated ways [m]");
+             "Length of simulated paths [m]");
   command
       .add_option("--cloud-points", options->set.cloud_points,
-                  "Most of a simulated sweep's cloud: place_scan.most_points")
+                  "place_scan.most_points of simulated sweeps")
       ->check(CLI::Range(10, static_cast<int>(model::PlaceScan::kMostPoints)))
       ->capture_default_str();
-  command.add_option("--seed", options->set.seed, "Of worlds, ways and detections")
+  command.add_option("--seed", options->set.seed, "Seed of worlds, paths and detections")
       ->capture_default_str();
   add_number(command, "--jobs", options->trial.jobs, 1, 256, "Queries side by side");
   command.add_option("--data", options->data,

@@ -44,9 +44,8 @@ void parse_blind(const std::string& text, LoopDriveOptions& drive) {
 }
 
 nlohmann::json path_json(const LoopScore& score) {
-  return {{"keyframes", score.keyframes}, {"placed", score.placed},        {"maps", score.maps},
-          {"in_map", score.in_map},       {"error_m", score.error_m},      {"ate_m", score.ate_m},
-          {"end_m", score.end_m},         {"online_end_m", score.online_m}};
+  return {{"keyframes", score.keyframes}, {"placed", score.placed},   {"maps", score.maps},
+          {"in_map", score.in_map},       {"error_m", score.error_m}, {"ate_m", score.ate_m}};
 }
 
 nlohmann::json closures_json(const LoopScore& score) {
@@ -60,8 +59,6 @@ nlohmann::json closures_json(const LoopScore& score) {
           {"wrong_accepted", score.accepted_wrong},
           {"waiting", score.waiting},
           {"refused", score.refused},
-          {"first_accepted_m", score.first_accepted_m},
-          {"largest_off_m", score.largest_off_m},
           {"mean_nees", score.mean_nees}};
 }
 
@@ -171,21 +168,9 @@ void run_loops(LoopsOptions options) {
 }
 
 void add_run_options(CLI::App& command, LoopsOptions& options) {
-  command.add_option("--runs", options.runs, "Draws of the odometry for each drive")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
+  add_number(command, "--runs", options.runs, 1, 10000, "Draws of the odometry for each drive");
   command.add_option("--seed", options.seed, "Seed of the odometry")->capture_default_str();
-  command.add_option("--jobs", options.jobs, "Runs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
-}
-
-/// Which solutions of a drive are made.
-void add_solution_options(CLI::App& command, LoopsOptions& options) {
-  command.add_flag("!--no-batch", options.batch, "Without the batch solution");
-  command.add_flag("!--no-without", options.without, "Without the drive without the loop closer");
-  command.add_flag("--reckon", options.reckon,
-                   "The loop closer alone, beside a mapper that only reckons by odometry");
+  add_number(command, "--jobs", options.jobs, 1, 256, "Runs side by side");
 }
 
 }  // namespace
@@ -197,9 +182,9 @@ std::string name_of(const std::string& folder) {
 }
 
 void add_loops_experiment(CLI::App& eval) {
-  CLI::App& command = *eval.add_subcommand("loops",
-                                           "Drives of stem frames that come back: loops found "
-                                           "while tracking, beside the batch solution");
+  CLI::App& command = *eval.add_subcommand(
+      "loops",
+      "Drives of stem frames with loops: those found while tracking, beside the batch solution");
   const auto options = std::make_shared<LoopsOptions>();
   command
       .add_option("drives", options->drives,
@@ -210,7 +195,8 @@ void add_loops_experiment(CLI::App& eval) {
   command.add_option("--blind", options->blind,
                      "Share of the drive on which no stem is seen, FROM-TO");
   add_run_options(command, *options);
-  add_solution_options(command, *options);
+  command.add_flag("--reckon", options->reckon,
+                   "Only the loop closer, with a mapper that only dead-reckons by odometry");
   command.add_option("--json", options->json, "Result document");
   command.callback([options] { run_guarded("loops", [options] { run_loops(*options); }); });
 }

@@ -207,7 +207,7 @@ void add_misstated_experiment(CLI::App& eval) {
   add_number(*command, "--runs", options->runs, 1, 100000, "Drives per row");
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
   command->add_option("--only", options->only,
-                      "Only rows whose text has this in it, and those where nothing is wrong");
+                      "Only rows whose text contains this, and those without a fault");
   add_number(*command, "--jobs", options->jobs, 1, 1024, "Rows side by side");
   command->add_option("--json", options->json, "Result file");
   command->callback([options] { run_guarded("misstated", [&] { run(*options); }); });

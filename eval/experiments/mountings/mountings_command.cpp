@@ -167,15 +167,16 @@ void add_mountings_experiment(CLI::App& eval) {
       "mountings",
       "One wrong mounting, unit or sign of IMU, LIDAR or wheels: is the right sensor named?");
   const auto options = std::make_shared<MountingsOptions>();
-  add_number(command, "--drives", options->drives, 0, 100000, "Each with --faults trials");
-  add_number(command, "--faults", options->faults, 1, 1000, "On each drive, one after another");
+  add_number(command, "--drives", options->drives, 0, 100000, "Drives, each with --faults trials");
+  add_number(command, "--faults", options->faults, 1, 1000,
+             "Trials on each drive, one after another");
   add_number(command, "--sound-drives", options->sound_drives, 0, 100000,
-             "Without any fault, other seeds");
-  command.add_option("--first-seed", options->first_seed, "The others follow it")
+             "Drives without any fault, with other seeds");
+  command.add_option("--first-seed", options->first_seed, "First seed; the others follow it")
       ->capture_default_str();
 
-  add_number(command, "--length-m", options->length_m, 40.0, 100000.0, "Of a drive [m]");
-  command.add_option("--only", options->only, "Faults with this in their name");
+  add_number(command, "--length-m", options->length_m, 40.0, 100000.0, "Length of a drive [m]");
+  command.add_option("--only", options->only, "Only faults whose name contains this");
   command.add_option("--config", options->config_dir, "Configuration of the chain's services")
       ->capture_default_str();
   add_number(command, "--jobs", options->jobs, 1, 256, "Drives side by side");

@@ -162,7 +162,7 @@ void add_long_drive(CLI::App& eval, const std::string& name, const std::string& 
 
   add_number(*command, "--runs", options->runs, 1, 100000, "Drives per size");
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
-  add_number(*command, "--length-m", options->route.length_m, 50.0, 1e6, "Of the drive [m]");
+  add_number(*command, "--length-m", options->route.length_m, 50.0, 1e6, "Length of the drive [m]");
   if (name == kLongDriveLoop) {
     add_number(*command, "--block-m", options->route.block_m, 200.0, 1e6,
                "Circumference of the block [m]");
@@ -172,11 +172,11 @@ void add_long_drive(CLI::App& eval, const std::string& name, const std::string& 
       ->check(CLI::Range(1.0, 1e4))
       ->capture_default_str();
   add_number(*command, "--hand-over-m", options->hand_over_m, 0.0, 1e6,
-             "What is farther from the vehicle goes to the disk [m]; 0 = nothing");
+             "Map parts farther from the vehicle than this go to the disk [m]; 0 = none");
   add_number(*command, "--sections", options->sections, 1, 1000,
-             "Parts of the drive, timed by themselves");
+             "Parts of the drive with a time each");
 
-  command->add_flag("!--no-uncut", options->has_uncut, "Without the same drives uncut");
+  command->add_flag("!--no-uncut", options->has_uncut, "Skip the same drives uncut");
   command->add_option("--json", options->json, "Result file; a plot goes beside it");
   command->add_flag("!--no-plots", options->plots, "Write JSON only");
   command->callback(

@@ -150,7 +150,9 @@ void add_partition(CLI::App& eval, const std::string& name, const std::string& d
              "Drives per route with the LIDAR chain");
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
   add_number(*command, "--jobs", options->jobs, 1, 256, "Drives side by side");
-  command->add_option("--routes", options->routes, "Of the thesis; road and block are of forest")
+  command
+      ->add_option("--routes", options->routes,
+                   "Routes of the thesis; road and block are in a forest")
       ->delimiter(',')
       ->check(CLI::IsMember(is_closed ? std::vector<std::string>{"urban", "block"}
                                       : std::vector<std::string>{"urban", "urban-countryside",
@@ -161,7 +163,7 @@ void add_partition(CLI::App& eval, const std::string& name, const std::string& d
       ->check(CLI::IsMember({"ideal", "lidar"}))
       ->capture_default_str();
   if (!is_dynamic) {
-    command->add_option("--size-m", options->sizes_m, "Path of a submap [m]")
+    command->add_option("--size-m", options->sizes_m, "Path length of a submap [m]")
         ->delimiter(',')
         ->check(CLI::Range(5.0, 1000.0))
         ->capture_default_str();
@@ -169,7 +171,7 @@ void add_partition(CLI::App& eval, const std::string& name, const std::string& d
   command->add_flag("--all-designs", options->all_designs,
                     "Variants of the baseline: unscented, joint covariance, full solution");
   command->add_option("--recordings", options->recording.folder,
-                      "Folder where the drives are kept, so that they are made once");
+                      "Folder in which drives are kept for later runs");
   command->add_option("--config", options->recording.config_dir, "Configuration of the chain")
       ->capture_default_str();
   command->add_option("--json", options->json, "Result file; plots go beside it");

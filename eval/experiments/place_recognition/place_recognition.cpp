@@ -223,7 +223,7 @@ void add_place_recognition_experiment(CLI::App& eval) {
                   "(with --map)")
       ->check(CLI::IsMember(names));
   add_number(command, "--window", options->window, 1, 50,
-             "Second set of rows: so many frames as one, aligned by their stems; 1 = none");
+             "Second set of rows: this many frames as one, aligned by their stems; 1 = none");
   add_number(command, "--jobs", options->jobs, 1, 256, "Queries side by side");
   command.add_option("--json", options->json, "Result document");
   command.callback([options] { run_guarded("place-recognition", [&] { run_places(*options); }); });

@@ -237,7 +237,7 @@ void add_recording_experiment(CLI::App& eval) {
   auto options = std::make_shared<Options>();
   command->add_option("log", options->log, "Log with the channels that the chain of --config takes")
       ->required();
-  command->add_option("--name", options->name, "In tables and pictures; default the file's");
+  command->add_option("--name", options->name, "Name in tables and pictures; default: the file's");
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
   command
@@ -246,10 +246,9 @@ void add_recording_experiment(CLI::App& eval) {
       ->delimiter(',')
       ->expected(2);
   command
-      ->add_option(
-          "--reference", options->reference,
-          "x,y,yaw [m, rad] on the vehicle of what GROUND_TRUTH is the pose of, where it is "
-          "not the vehicle's")
+      ->add_option("--reference", options->reference,
+                   "x,y,yaw [m, rad] on the vehicle of the frame of GROUND_TRUTH, if that is not "
+                   "the vehicle's")
       ->delimiter(',')
       ->expected(3);
   command->add_flag("!--no-plots", options->plots, "No plots");

@@ -214,20 +214,20 @@ void run(const ReliabilityOptions& options) {
 void add_reliability_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand(
       "reliability",
-      "Real processes, at the speed of the drive, while messages are held back and processes stop");
+      "Real processes at the speed of the drive, with delayed messages and stopped processes");
   const auto options = std::make_shared<ReliabilityOptions>();
   add_number(command, "--drives", options->drives, 1, 100000, "Drives");
-  command.add_option("--first-seed", options->first_seed, "The others follow it")
+  command.add_option("--first-seed", options->first_seed, "First seed; the others follow it")
       ->capture_default_str();
-  command.add_option("--delays", options->faults, "Most of each drive")->capture_default_str();
-  add_number(command, "--longest-s", options->longest_s, 0.0, 60.0, "Of a delay [s]");
+  command.add_option("--delays", options->faults, "Most delays of a drive")->capture_default_str();
+  add_number(command, "--longest-s", options->longest_s, 0.0, 60.0, "Longest delay [s]");
 
-  add_number(command, "--length-m", options->length_m, 250.0, 100000.0, "Of a drive [m]");
-  command.add_option("--only", options->only, "Delays with this in their name");
+  add_number(command, "--length-m", options->length_m, 250.0, 100000.0, "Length of a drive [m]");
+  command.add_option("--only", options->only, "Only delays whose name contains this");
   CLI::Option* load = add_number(command, "--load", options->load, 0, 256,
-                                 "Processes beside them that only compute");
+                                 "Further processes that only load the processor");
   add_number(command, "--jobs", options->jobs, 1, 64,
-             "Drives at a time: each has a bus of its own and is load for the others");
+             "Drives in parallel; each has its own bus and is load for the others");
 
   CLI::Option* undelayed =
       command.add_flag("--undelayed", options->is_undelayed,
@@ -241,13 +241,13 @@ void add_reliability_experiment(CLI::App& eval) {
           ->excludes(undelayed);
   CLI::Option* supervised =
       command.add_flag("--supervised", options->live.supervised,
-                       "Under `understory launch`, which restarts what is stopped");
+                       "Under `understory launch`, which restarts stopped processes");
   for (CLI::Option* option : {undelayed, in_memory}) option->excludes(load)->excludes(supervised);
   command.add_option("--config", options->live.config_dir, "Configuration of the processes")
       ->capture_default_str();
   command.add_option(
       "--json", options->json,
-      "Result document, written after each drive; a call that was interrupted goes on");
+      "Result document, written after each drive; an interrupted call can be continued");
   command.callback([options] { run_guarded("reliability", [options] { run(*options); }); });
 }
 

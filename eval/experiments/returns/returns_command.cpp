@@ -143,7 +143,7 @@ void run(const ReturnsOptions& options) {
 
 void add_returns_experiment(CLI::App& eval) {
   auto* command = eval.add_subcommand(
-      "returns", "A drive that drifts and comes back near itself: merges, closures, NEES");
+      "returns", "A drive that drifts and returns to its own path: merges, closures, NEES");
   auto options = std::make_shared<ReturnsOptions>();
   add_number(*command, "--runs", options->runs, 1, 100000, "Drives per cell");
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();

@@ -289,10 +289,10 @@ void add_landmarks_vs_error_experiment(CLI::App& eval) {
   command->add_option("--seed", options->seed, "Seed of everything");
   add_number(*command, "--jobs", options->jobs, 1, 256, "Drives side by side");
   add_number(*command, "--runs", options->runs, 1, 1000,
-             "Of each route, in a world of its own each");
-  command->add_flag("!--no-wheels", options->wheels, "An IMU alone, as in the thesis on submaps");
+             "Runs of each route, each in another world");
+  command->add_flag("!--no-wheels", options->wheels, "Only an IMU, as in the thesis on submaps");
   add_number(*command, "--length-m", options->length_m, 200.0, 100000.0,
-             "Of the city routes; the country is 1.5 x");
+             "Length of the city routes [m]; the country route is 1.5 times as long");
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
   command->add_flag("!--no-plots", options->plots, "No plots");

@@ -218,10 +218,9 @@ void add_shared_errors_experiment(CLI::App& eval) {
   const auto options = std::make_shared<SharedErrorsOptions>();
   command.add_option("--data", options->data, "Folder of recordings, with the surveyed maps");
   command
-      .add_option(
-          "--drive", options->drives,
-          "Which simulated drives; default six, none with --recorded. Beside the six there is "
-          "longleaf-few, two or three stems a frame")
+      .add_option("--drive", options->drives,
+                  "Simulated drives; default: six, or none with --recorded. A seventh is "
+                  "longleaf-few, with two or three stems per frame")
       ->delimiter(',');
 
   command
@@ -238,17 +237,16 @@ void add_shared_errors_experiment(CLI::App& eval) {
       ->check(CLI::Range(0.0, 90.0));
 
   command
-      .add_option(
-          "--errors", options->errors,
-          "shared: as measured; along, direction, range: that part alone; independent. White "
-          "noise has the power of what is off")
+      .add_option("--errors", options->errors,
+                  "shared: as measured; along, direction, range: only this part; independent: "
+                  "none. White noise has the power of the parts left out")
       ->delimiter(',')
       ->check(CLI::IsMember({"shared", "along", "direction", "range", "independent"}));
 
   command.add_option("--config", options->config, "Configuration folder of the stages")
       ->capture_default_str();
   add_number(command, "--runs", options->runs, 1, 10000, "Drives through each map");
-  command.add_option("--seed", options->seed, "Seed of ways, errors and odometry")
+  command.add_option("--seed", options->seed, "Seed of paths, errors and odometry")
       ->capture_default_str();
   add_number(command, "--jobs", options->jobs, 1, 256, "Runs side by side");
   command.add_option("--json", options->json, "Result document");

@@ -300,9 +300,10 @@ void add_wheels_experiment(CLI::App& eval) {
   auto* command = eval.add_subcommand(
       "wheels", "The chain with wheels, with exact ones and without, on the same drives");
   auto options = std::make_shared<Options>();
-  add_number(*command, "--seeds", options->seeds, 1, 1000, "How many");
-  command->add_option("--first-seed", options->first_seed, "The others follow it");
-  add_number(*command, "--length-m", options->length_m, 50.0, 100000.0, "Of all but urban");
+  add_number(*command, "--seeds", options->seeds, 1, 1000, "Number of seeds");
+  command->add_option("--first-seed", options->first_seed, "First seed; the others follow it");
+  add_number(*command, "--length-m", options->length_m, 50.0, 100000.0,
+             "Length of all drives but urban [m]");
   command->add_option("--lidar", options->lidar, "vlp32 (default) or vlp16")
       ->check(CLI::IsMember({"vlp32", "vlp16"}));
   command->add_option("--worlds", options->worlds, "forest, urban, urban-countryside, countryside")
@@ -310,9 +311,8 @@ void add_wheels_experiment(CLI::App& eval) {
       ->check(CLI::IsMember({"forest", "urban", "urban-countryside", "countryside"}));
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
   add_number(*command, "--jobs", options->jobs, 1, 256, "Drives side by side");
-  command->add_option(
-      "--json", options->json,
-      "Results; FILE.progress beside it has what is done, and a later call goes on");
+  command->add_option("--json", options->json,
+                      "Results; FILE.progress keeps finished drives, and a later call continues");
   command->callback([options] { run_guarded("wheels", [options] { run(*options); }); });
 }
 

@@ -191,9 +191,9 @@ void run_existence_camera(const CameraOptions& options) {
 }  // namespace
 
 void add_existence_camera_experiment(CLI::App& eval) {
-  CLI::App& command = *eval.add_subcommand("existence-camera",
-                                           "What culling is worth to a camera that comes back: "
-                                           "relocalisation, tracking, mapping needed");
+  CLI::App& command = *eval.add_subcommand(
+      "existence-camera",
+      "Effect of culling on a camera's later visits: relocalisation, tracking, mapping needed");
   const auto options = std::make_shared<CameraOptions>();
   add_number(command, "--runs", options->runs, 1, 1000, "Worlds per kind and share");
   command.add_option("--seed", options->seed, "Seed of the first world; tuned on 100001")

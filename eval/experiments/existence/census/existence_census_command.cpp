@@ -233,22 +233,16 @@ void run_censuses(const CensusCommand& options) {
 }
 
 void add_run_options(CLI::App& command, CensusCommand& options) {
-  command.add_option("--runs", options.runs, "Sets of drives")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_number(command, "--runs", options.runs, 1, 1000, "Sets of drives");
   command.add_option("--seed", options.seed, "Seed of the first one")->capture_default_str();
-  command.add_option("--jobs", options.jobs, "Runs side by side")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  add_number(command, "--jobs", options.jobs, 1, 256, "Runs side by side");
 }
 
 /// Which forests are driven through.
 void add_case_options(CLI::App& command, CensusCommand& options) {
-  command
-      .add_option("--missed", options.missed,
-                  "Share of the stems that a drive misses: one of the two alone")
+  command.add_option("--missed", options.missed, "Only this share of stems that a drive misses")
       ->check(CLI::IsMember({0.36, 0.66}));
-  command.add_option("--only", options.only, "The forest that changed, or the one that did not")
+  command.add_option("--only", options.only, "Only the changed forest, or only the unchanged one")
       ->check(CLI::IsMember({"change", "control"}));
   command
       .add_option("--errors", options.errors,
@@ -261,11 +255,7 @@ void add_case_options(CLI::App& command, CensusCommand& options) {
 
 /// How a forest is driven through, and with what.
 void add_drive_options(CLI::App& command, CensusOptions& census) {
-  command.add_option("--drives", census.forest.drives, "After the one that maps")
-      ->check(CLI::Range(1, 100))
-      ->capture_default_str();
-  command.add_option("--pass-m", census.pass_m, "looks.pass_m instead of the configured")
-      ->check(CLI::Range(1.0, 1e6));
+  add_number(command, "--drives", census.forest.drives, 1, 100, "Drives after the one that maps");
   command.add_option("--logs", census.logs,
                      "Folder for the inputs of each drive, as logs, and the maps");
   command.add_flag("--state-covariances", census.state_covariances,
