@@ -1,4 +1,4 @@
-// How likely chance alone produces so many hits.
+// Probability that chance alone produces a number of hits.
 #pragma once
 
 #include <cmath>

@@ -11,15 +11,15 @@
 
 namespace understory::constellation {
 
-/// Index of a landmark in contiguous storage; given again after it was removed.
+/// Index of a landmark in contiguous storage; reused after a removal.
 using Slot = std::uint32_t;
 inline constexpr Slot kNoSlot = IndexTable::kNone;
 
-/// A uniform grid over points that are known by slot. Cells are heads of short lists in tiles of 32
-/// x 32; tiles exist only where there are points, so the extent of the map costs nothing.
+/// A uniform grid over points addressed by slot. Cells are heads of short lists in tiles of 32 x
+/// 32; tiles exist only where there are points, so the extent of the map costs no memory.
 class PointGrid {
  public:
-  /// Largest absolute coordinate that can be stored or asked for [m].
+  /// Largest absolute coordinate of a stored or queried point [m].
   static constexpr double kMaxCoordinate = 2.0e6;
 
   /// Empty, with cells of `cell_m` [m], > 0. Fastest where a cell holds about one point.
@@ -43,8 +43,8 @@ class PointGrid {
   Eigen::Vector2d position(Slot slot) const { return {points_[slot].x, points_[slot].y}; }
 
   /// Calls f(slot, squared distance [m^2]) for every point within `radius_m` of (x, y), in no
-  /// meaningful order. Costs the cells of the square around the circle, or all points where these
-  /// cells are far more.
+  /// meaningful order. Cost: the cells of the square around the circle, or all points where there
+  /// are far more cells than points.
   template <class F>
   void for_each_within(double x, double y, double radius_m, F&& f) const {
     const double squared = radius_m * radius_m;
@@ -84,7 +84,7 @@ class PointGrid {
   }
 
   /// Calls f(slot, squared distance) for every point in cells at ever larger distance from (x, y),
-  /// until `done(r)` with r = the radius [m] within which nothing is missing any more.
+  /// until `done(r)` holds; all points within r [m] have been visited by then.
   template <class F, class Done>
   void for_each_outward(double x, double y, F&& f, Done&& done) const {
     const auto cx = static_cast<std::int64_t>(cell_of(x));
@@ -135,7 +135,8 @@ class PointGrid {
     };
     return std::max(0.0, std::min(to_border(x), to_border(y)));
   }
-  /// Whether so many columns and rows of cells cost more than all points: radii of kilometres.
+  /// Whether a visit of these columns and rows of cells costs more than one of all points (radii of
+  /// kilometres).
   bool has_more_cells(std::uint32_t columns, std::uint32_t rows) const {
     const std::uint64_t cells = std::uint64_t{columns} * rows;
     return cells > 65536 + 4 * std::uint64_t{points_.size()};

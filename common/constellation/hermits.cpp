@@ -3,13 +3,13 @@
 namespace understory::constellation {
 namespace {
 
-/// Landmarks just beyond the radius are visited as well and left out by their squared distance,
-/// which is the same seen from both: so both count each other, or neither.
+/// Landmarks just beyond the radius are visited too and excluded by their squared distance. That is
+/// equal from both ends, so each counts the other, or neither does.
 constexpr double kGenerous = 1.0 + 1e-6;
 
 }  // namespace
 
-/// Calls f(slot, is near) for each other landmark of the crowd around `position_m`.
+/// Calls f(slot, is near) for each other landmark within kAround * apart_m of `position_m`.
 template <class F>
 void Hermits::for_each_around(Slot slot, const Eigen::Vector2d& position_m, const PointGrid& grid,
                               F&& f) const {
@@ -52,7 +52,7 @@ void Hermits::moved(Slot slot, LandmarkId id, const Eigen::Vector2d& before_m,
   inserted(slot, id, grid);
 }
 
-/// Joins the net or leaves it, as the surroundings say.
+/// Adds the landmark to the net or removes it, by its surroundings.
 void Hermits::settle(Slot slot, const PointGrid& grid) {
   Surroundings& one = seen_[slot];
   if (is_hermit(one) == one.is_member) return;

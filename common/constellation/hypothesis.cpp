@@ -8,11 +8,11 @@
 namespace understory::constellation {
 namespace {
 
-/// Half widths of gates that are tried [sigmas].
+/// Half widths of the gates to try [sigmas].
 constexpr std::array kGateWidths{3.0, 2.5, 2.0, 1.5, 1.1};
 
-/// Of the gates the one that tells right from wrong best (Kullback-Leibler divergence): where
-/// landmarks are far apart it is wide, in a crowd narrow.
+/// Chooses the gate that separates right from wrong poses best (Kullback-Leibler divergence): wide
+/// where landmarks are far apart, narrow where they are dense.
 void set_gate(TestPoint& test, double sigma_m, double density_per_m2,
               const LocaliseParameters& parameters) {
   double most = -1.0;

@@ -13,26 +13,27 @@ namespace understory::constellation {
 namespace constellation {
 namespace {
 
-/// Points whose triangles are tried first; as many again and again until all have been.
+/// Points whose triangles are tried first; then as many again, until all are tried.
 constexpr std::size_t kFirstPoints = 12;
-/// The same for points that stand apart: in a crowd theirs are the only telling triangles.
+/// The same for isolated points: in a dense area only their triangles are distinctive.
 constexpr std::size_t kFirstHermits = 96;
-/// Triangles of those are taken among so many nearest ones: some have no counterpart in the map.
+/// Triangles of isolated points are formed among this many nearest ones: some have no counterpart
+/// in the map.
 constexpr int kHermitNeighbours = 8;
 /// Wald's thresholds on the log likelihood ratio.
 constexpr double kReject = -1.9;
 constexpr double kAccept = 9.0;
 constexpr double kAcceptAtEnd = 2.5;
 
-/// Triangles of one kind: of all points, or of those that stand apart.
+/// Triangles of one kind: of all points, or of isolated points.
 struct Kind {
   TriangleSource source;
-  const TriangleIndex* index = nullptr;  ///< Of the map's triangles of that kind.
+  const TriangleIndex* index = nullptr;  ///< Index of the map's triangles of that kind.
   std::size_t first_points = kFirstPoints;
   std::size_t taken = 0;  ///< Points whose triangles are in use.
 };
 
-/// A triangle of the observation and where the map has such.
+/// A triangle of the observation and the place of similar ones in the index.
 struct Candidate {
   Triangle triangle;
   const TriangleIndex* index = nullptr;
@@ -75,7 +76,7 @@ class Search {
   std::vector<Candidate> candidates_;  // taken from the sources, in the order of trying
   std::optional<FittedPose> best_;
   std::optional<FittedPose> runner_up_;  // at a different pose
-  std::optional<SettledPose> settled_;   // of an accepted best
+  std::optional<SettledPose> settled_;   // of the accepted best pose
   std::uint32_t hypotheses_ = 0;
   std::uint32_t lookups_ = 0;
 };
@@ -101,7 +102,7 @@ bool Search::exhausted() const {
                      [](const Kind& kind) { return kind.source.exhausted(); });
 }
 
-/// The triangles of some more points, the most telling of them first.
+/// Takes the triangles of some more points, those with the fewest candidates first.
 std::span<const Candidate> Search::more_triangles() {
   const std::size_t known = candidates_.size();
   std::vector<Candidate> fresh;
@@ -130,7 +131,7 @@ std::array<float, 3> Search::tolerance(const Triangle& triangle, double side_sig
   return result;
 }
 
-/// The pose that the hypothesis leads to, if its sequential test is passed.
+/// The fitted pose of the hypothesis, if it passes its sequential test.
 std::optional<FittedPose> Search::try_hypothesis(const TriangleQuery& query,
                                                  const std::array<Slot, 3>& corners) {
   const PointGrid& grid = map_.grid();
@@ -203,9 +204,9 @@ bool Search::search(std::span<const Candidate> candidates, double side_sigmas) {
   return false;
 }
 
-/// A scene that repeats elsewhere shows in the triangles of the accepted pose, of which the search
-/// has looked at one only up to the accepted hypothesis. Those that find their own landmarks again
-/// would find a copy of them too: so many are looked up to the end.
+/// A repeated scene has copies of the accepted pose's triangles, but the search stopped at the
+/// first accepted hypothesis. Some triangles of the accepted pose are therefore looked up
+/// completely; a copy of their landmarks would be found as well.
 void Search::look_for_runner_up(double side_sigmas) {
   std::vector<Slot> explained(observation_.points.size(), kNoSlot);
   for (const Pair& pair : best_->pairs) explained[pair.point] = pair.slot;

@@ -7,7 +7,8 @@ namespace understory::constellation {
 namespace {
 
 constexpr LandmarkId kReservedId = ~LandmarkId{0};
-/// What hermits keep from all others [m]: crowds of 0.08, 0.3 and 1.3 landmarks on a square metre.
+/// Least distances of hermits from all others [m], for 0.08, 0.3 and 1.3 landmarks per square
+/// metre.
 constexpr std::array kApart_m{2.0, 1.0, 0.5};
 
 }  // namespace
@@ -85,7 +86,7 @@ void ConstellationMap::settle() {
   shifted_.clear();
 }
 
-/// The landmark's triangles follow it.
+/// Updates the landmark's triangles.
 void ConstellationMap::settle(Slot slot) {
   const Eigen::Vector2d before_m = net_.grid().position(slot);
   net_.move(slot, grid_.position(slot));

@@ -1,4 +1,4 @@
-// A map of landmarks that all look alike, in which one observation finds its place at once.
+// A map of identical landmarks, with one-shot localisation of an observation.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,22 +17,22 @@
 
 namespace understory::constellation {
 
-/// A landmark and its distance from the point that was asked for.
+/// A landmark and its distance from the queried point.
 struct NearestLandmark {
   LandmarkId id = 0;
   double distance_m = 0.0;
 };
 
 /// Landmarks by id, and the triangles that each forms with its nearest neighbours, by their side
-/// lengths. Every change is made in place and touches the neighbourhood only; the result does not
-/// depend on the order of changes. Memory: positions are kept twice, as they are and as the
-/// triangles have them.
+/// lengths. Every change is made in place and costs only its neighbourhood; the result does not
+/// depend on the order of changes. Memory: positions are stored twice, the present ones and those
+/// of the triangles.
 ///
 /// Positions must be finite and within constellation::PointGrid::kMaxCoordinate.
 class ConstellationMap {
  public:
   using Parameters = MapParameters;  ///< Sizes of the look-up structures.
-  /// Triangles are made among a landmark and two of its so many nearest neighbours.
+  /// Triangles are formed of a landmark and two of this many nearest neighbours.
   static constexpr std::size_t kNeighbours = TriangleNet::kNeighbours;
 
   /// An empty map with the default parameters.
@@ -46,12 +46,12 @@ class ConstellationMap {
   bool remove(LandmarkId id);
   /// False if `id` is not there or the position cannot be stored.
   bool move(LandmarkId id, const Eigen::Vector2d& position_m);
-  /// The same, but the landmark's triangles stay as they are until settle(): where many landmarks
-  /// move again and again, and nothing is searched meanwhile. O(log(landmarks that wait)), a
-  /// hundredth of move().
+  /// The same, but the landmark's triangles stay as they are until settle(): for many repeated
+  /// moves without a search between them. O(log(shifted landmarks)), a hundredth of the cost of
+  /// move().
   bool shift(LandmarkId id, const Eigen::Vector2d& position_m);
-  /// Brings the triangles up to date, as move() in place of shift() had left them. Cost: one move()
-  /// for each landmark that was shifted, however often it was.
+  /// Updates the triangles of all shifted landmarks; the result equals that of move() in place of
+  /// shift(). Cost: one move() for each shifted landmark.
   void settle();
   /// Whether no landmark was shifted since settle().
   bool is_settled() const { return shifted_.empty(); }
@@ -65,8 +65,8 @@ class ConstellationMap {
 
   /// The landmark closest to `point_m` within `radius_m`; of equally close ones the smaller id.
   std::optional<NearestLandmark> nearest(const Eigen::Vector2d& point_m, double radius_m) const;
-  /// Calls f(id, position [m], distance [m]) for each landmark within `radius_m`, in no meaningful
-  /// order: sort what reaches an output.
+  /// Calls f(id, position [m], distance [m]) for each landmark within `radius_m`, in no defined
+  /// order: sort before any output.
   template <class F>
   void for_each_within(const Eigen::Vector2d& point_m, double radius_m, F&& f) const {
     if (!PointGrid::representable(point_m)) return;
@@ -81,10 +81,10 @@ class ConstellationMap {
   /// whose position lies in it are considered.
   ///
   /// Triangles among nearest neighbours of the observation are looked up by side lengths, those
-  /// with the fewest candidates first; each similar triangle of the map is a hypothesis, tested on
-  /// the points around it one by one (Wald's sequential test), then refined on all points. Accepted
-  /// is a pose that chance does not give and that no different pose comes close to.
-  /// Precondition: is_settled().
+  /// with the fewest candidates first; each similar triangle of the map is a hypothesis. It is
+  /// tested on the points around it one by one (Wald's sequential test), then refined on all
+  /// points. A pose is accepted if chance does not explain it and no different pose is nearly as
+  /// good. Precondition: is_settled().
   Localisation localise(std::span<const ObservedPoint> points,
                         const LocaliseParameters& parameters = {},
                         const std::optional<Disc>& where = std::nullopt) const;
@@ -100,7 +100,7 @@ class ConstellationMap {
   const PointGrid& grid() const { return grid_; }
   /// The triangles by side lengths, for the search in localise.cpp. Vertices are slots.
   const TriangleIndex& triangle_index() const { return net_.triangles(); }
-  /// Landmarks that stand alone in a crowd, at several distances from others.
+  /// Isolated landmarks in dense areas, one set for each least distance to others.
   std::span<const Hermits> hermits() const { return hermits_; }
   /// Id of the landmark in a slot. Precondition: the slot is in use.
   LandmarkId id_of(Slot slot) const { return net_.id_of(slot); }
@@ -109,7 +109,7 @@ class ConstellationMap {
   void settle(Slot slot);
 
   PointGrid grid_;
-  TriangleNet net_;  ///< Where landmarks were when it was settled.
+  TriangleNet net_;  ///< Positions at the last settle().
   std::set<Slot> shifted_;
   std::vector<Hermits> hermits_;
   IndexTable slots_;  // id -> slot

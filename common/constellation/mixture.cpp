@@ -8,12 +8,12 @@
 namespace understory::constellation {
 namespace {
 
-/// A landmark whose weight is less than this share of that of none is left out.
+/// A landmark is left out if its weight is below this share of the weight of "no landmark".
 constexpr double kNegligible = 0.01;
 /// Largest distance at which a landmark counts [m], however wide the spread.
 constexpr double kMaxReach_m = 3.0;
 constexpr int kMaxClimbs = 30;
-/// The spread's variances shrink by this per round.
+/// The spread's variances shrink by this factor per round.
 constexpr double kCooling = 0.3;
 /// A step shorter than this (in metres at the rim of the observation) ends the climb.
 constexpr double kSettled_m = 1e-5;

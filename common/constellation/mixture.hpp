@@ -1,4 +1,4 @@
-// How well a pose explains all points of an observation, with no point tied to one landmark.
+// Likelihood of all points of an observation at a pose, without association of points to landmarks.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,15 @@
 
 namespace understory::constellation {
 
-/// The model: a point is of no landmark with probability 1 - `share`, and lies then anywhere; else
-/// it is of any of the landmarks around, `density` of them on a square metre.
+/// The model: with probability 1 - `share` a point belongs to no landmark and is uniformly
+/// distributed; otherwise it belongs to one of the landmarks around it, `density` of them per
+/// square metre.
 struct Mixture {
   double share = 0.9;
   double density_per_m2 = 0.01;
 };
 
-/// What a pose is known to while it is sought: widens each point's noise. About `centre`, frame
+/// Variance of the pose during the search; it is added to each point's noise. About `centre`, frame
 /// `sensor`.
 struct Spread {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
@@ -26,15 +27,15 @@ struct Spread {
 
 /// The mixture at one pose. Tangent order, right perturbation.
 struct MixtureAt {
-  double log_likelihood = 0.0;  ///< Against all points lying anywhere; natural logarithm.
+  double log_likelihood = 0.0;  ///< Natural logarithm, relative to uniformly distributed points.
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-  /// If it were known which landmark each point is of.
+  /// Information on the pose if each point's landmark were known.
   Eigen::Matrix3d complete = Eigen::Matrix3d::Zero();
-  /// What not knowing it takes away (Louis 1982).
+  /// Information lost because it is not known (Louis 1982).
   Eigen::Matrix3d missing = Eigen::Matrix3d::Zero();
   std::uint32_t lookups = 0;  ///< Points looked up in the map.
 
-  /// Information on the pose: of the observation as it is.
+  /// Information of the observation on the pose.
   Eigen::Matrix3d information() const { return complete - missing; }
 };
 
@@ -50,8 +51,8 @@ struct MixtureMode {
   std::uint32_t lookups = 0;
 };
 
-/// Climbs from `start` by expectation and maximisation while the spread shrinks to nothing
-/// (deterministic annealing: what is between start and maximum is smoothed away at first).
+/// Climbs from `start` by expectation and maximisation while the spread shrinks to zero
+/// (deterministic annealing: at first the spread smooths away lesser maxima).
 MixtureMode climb(const PreparedObservation& observation, const PointGrid& grid,
                   const geometry::SE2& start, const Mixture& mixture, Spread spread);
 

@@ -102,7 +102,7 @@ TriangleSource::TriangleSource(const PreparedObservation& observation,
     return a.x < b.x || (a.x == b.x && (a.y < b.y || (a.y == b.y && a.point < b.point)));
   });
 
-  // Strides of the golden ratio spread the first few points evenly, whatever the order given.
+  // Strides of the golden ratio spread the first few points evenly, whatever their order.
   auto stride = static_cast<std::size_t>(0.618 * static_cast<double>(n)) | 1U;
   while (std::gcd(stride, n) != 1) ++stride;
   order_.resize(n);
@@ -110,13 +110,14 @@ TriangleSource::TriangleSource(const PreparedObservation& observation,
   neighbours_.resize(observation.points.size());
 }
 
-/// Points sorted by x: neighbours are sought to both sides, until x alone is too far.
+/// Points sorted by x: the search for neighbours goes to both sides, until the distance in x alone
+/// is too large.
 TriangleSource::Neighbours TriangleSource::nearest(std::size_t place) const {
   Neighbours list;
   std::array<double, kMaxNeighbours> squared{};
   const ByX& own = by_x_[place];
 
-  // True while the walk may go on.
+  // True while the search may continue.
   const auto consider = [&](const ByX& other) {
     const double dx = other.x - own.x;
     const double dy = other.y - own.y;
@@ -168,7 +169,7 @@ std::vector<Triangle> TriangleSource::take(std::size_t count) {
       for (int j = i + 1; j < list.count; ++j) {
         const std::uint32_t b = list.point[static_cast<std::size_t>(i)];
         const std::uint32_t c = list.point[static_cast<std::size_t>(j)];
-        // Given out before, with another corner?
+        // Returned before, by another corner?
         if (neighbours_[b].has(a) && neighbours_[b].has(c)) continue;
         if (neighbours_[c].has(a) && neighbours_[c].has(b)) continue;
         const Triangle triangle = canonical_triangle(corner(a), corner(b), corner(c));

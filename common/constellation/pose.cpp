@@ -14,25 +14,25 @@ namespace {
 constexpr int kMaxRounds = 8;
 /// Rounds on the near points only.
 constexpr int kNearRounds = 2;
-/// Corners of the triangle that gave the hypothesis: hits by construction.
+/// Corners of the hypothesis's triangle: they are hits by construction.
 constexpr double kGiven = 3.0;
 
-/// Where a gate holds a landmark by chance more often than this, narrower ones are looked at.
+/// If the probability of a landmark in a gate by chance is above this, narrower gates are tried.
 constexpr double kCrowdedChance = 0.2;
 /// Parts of the gate's half width.
 constexpr std::array kNarrowGates{0.6, 0.35};
-/// What choosing among three counts adds to the bound [decades].
+/// The choice among three counts adds this to the bound [decades].
 constexpr double kOneOfThree = 0.48;
-/// From so many points on a pose is fitted to the kNearPoints around its first pairs before all
-/// are asked...
+/// With this many points or more, a pose is first fitted to the kNearPoints around its first
+/// pairs...
 constexpr std::size_t kManyPoints = 100;
 constexpr std::size_t kNearPoints = 48;
-/// ... and only if these are less likely chance than that (log10).
+/// ... and to all points only if their bound on chance (log10) is below this.
 constexpr double kPromising = -2.0;
 
-/// How well the motion is known, as far as gates need it.
+/// Uncertainty of the motion, for the gates.
 struct MotionUncertainty {
-  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Of the pairs, sensor frame.
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< Mean of the pairs, sensor frame.
   double translation_variance = 0.0;
   double rotation_variance = 0.0;
 };
@@ -67,7 +67,7 @@ double gate(const PreparedPoint& point, const MotionUncertainty& motion,
   return std::min(parameters.gate_sigmas * std::sqrt(variance), parameters.max_gate_m);
 }
 
-/// Of two points that claim one landmark the closer one keeps it.
+/// If two points have the same landmark, the closer point keeps it.
 void make_one_to_one(std::vector<Pair>& pairs) {
   std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
     if (a.slot != b.slot) return a.slot < b.slot;
@@ -106,7 +106,7 @@ bool equal(const std::vector<Pair>& a, const std::vector<Pair>& b) {
   });
 }
 
-/// Probability that a point dropped at random hits a landmark, at the density found there.
+/// Probability that a random point hits a landmark, at the local density.
 double mean_chance(const PreparedObservation& observation, const PointGrid& grid,
                    const geometry::SE2& map_T_sensor, const MotionUncertainty& motion,
                    const LocaliseParameters& parameters) {
@@ -123,8 +123,8 @@ double mean_chance(const PreparedObservation& observation, const PointGrid& grid
   return count * area / (observation.radius_m * observation.radius_m);
 }
 
-/// What chance has to do with the pairs. In a crowd a gate holds a landmark wherever it lies, and a
-/// narrow one tells more: of a few widths the most telling one counts.
+/// Computes the bound on chance for the pairs. In a dense area every wide gate contains a landmark,
+/// so narrow gates are tried too, and the lowest bound counts.
 void rate(FittedPose& fitted, const PreparedObservation& observation, const PointGrid& grid,
           const MotionUncertainty& motion, const LocaliseParameters& parameters) {
   if (fitted.pairs.size() < 3) return;
@@ -173,7 +173,7 @@ Eigen::Vector2d centre_of(const PreparedObservation& observation, const std::vec
   return sum / static_cast<double>(pairs.size());
 }
 
-/// The kNearPoints closest ones as an observation of its own; `observed` are their indices.
+/// The kNearPoints closest points as a separate observation; `observed` are their indices.
 PreparedObservation points_around(const Eigen::Vector2d& centre,
                                   const PreparedObservation& observation) {
   std::vector<std::pair<double, std::uint32_t>> order;
@@ -190,7 +190,7 @@ PreparedObservation points_around(const Eigen::Vector2d& centre,
   return near;
 }
 
-/// Those pairs whose points are among the near ones, by their indices there.
+/// The pairs of near points, with indices into the near points.
 std::vector<Pair> pairs_of(const PreparedObservation& near, const std::vector<Pair>& pairs) {
   std::vector<Pair> result;
   for (const Pair& pair : pairs) {

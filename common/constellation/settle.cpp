@@ -13,16 +13,17 @@
 namespace understory::constellation {
 namespace {
 
-/// How far off a pose may be to be attracted, as standard deviations.
+/// Distance from which a maximum attracts the pose, as standard deviations.
 struct Reach {
   double translation_m;
   double rotation_rad;
 };
 constexpr Reach kNarrowReach{0.7, 0.02};
 constexpr std::array kWideReaches{Reach{1.5, 0.05}, Reach{3.0, 0.1}};
-/// Where a larger share of the points is explained, the wide ones are not tried.
+/// Where a larger share of the points is explained, the wide reaches are not tried.
 constexpr double kWellExplained = 0.8;
-/// Shares of explained points that differ by more mean another mixture.
+/// If the share of explained points changes by more than this, the climb is repeated with the new
+/// share.
 constexpr double kOtherShare = 0.05;
 /// Two climbs ended at the same maximum: squared distance in sigmas.
 constexpr double kSameMaximum = 9.0;
@@ -71,7 +72,7 @@ std::optional<SettledPose> settle(const PreparedObservation& observation, const 
   settled.pose = pairs_at(observation, grid, best.map_T_sensor, start.pairs, parameters);
   settled.lookups = settled.pose.lookups;
 
-  // More points are explained than where it began: so more of them tell the pose.
+  // More points are explained than at the start, so more of them determine the pose.
   const Mixture now = mixture_at(observation, grid, settled.pose);
   if (std::abs(now.share - first.share) > kOtherShare) {
     best = climb(observation, grid, best.map_T_sensor, now, {});

@@ -6,9 +6,9 @@
 
 namespace understory::constellation {
 
-/// Linear probing at a load of at most 5/8, keys and values side by side: a look-up touches one
-/// cache line as a rule, which is what the millions of look-ups of a search cost. Never iterated,
-/// so its order cannot reach an output. The key ~0 is reserved.
+/// Linear probing at a load of at most 5/8, keys and values side by side: a look-up usually touches
+/// one cache line, and a search makes millions of look-ups. The table is never iterated, so its
+/// order cannot reach an output. The key ~0 is reserved.
 class IndexTable {
  public:
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
@@ -29,7 +29,7 @@ class IndexTable {
     place(key, value);
     ++size_;
   }
-  /// Removes `key` if it is there; closes the gap, so that no tombstones gather.
+  /// Removes `key` if it is there; closes the gap, so there are no tombstones.
   void erase(std::uint64_t key) {
     std::size_t hole = home(key);
     while (entries_[hole].key != key) {

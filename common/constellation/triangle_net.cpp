@@ -15,7 +15,7 @@ SlotTriple ascending(Slot a, Slot b, Slot c) {
   return {a, b, c};
 }
 
-/// The library's comparison of arrays goes byte by byte.
+/// The standard library compares arrays byte by byte.
 bool before(const SlotTriple& a, const SlotTriple& b) {
   const std::uint64_t first = (std::uint64_t{a[0]} << 32) | a[1];
   const std::uint64_t second = (std::uint64_t{b[0]} << 32) | b[1];
@@ -81,7 +81,7 @@ void TriangleNet::update(Slot changed, std::vector<Slot>& anchors, Change&& chan
   lists_before.reserve(anchors.size());
   for (const Slot anchor : anchors) lists_before.push_back(neighbours_[anchor]);
 
-  // Sides that end at the changed landmark have to be computed before it changes.
+  // Sides at the changed landmark are computed before it changes.
   const std::vector<SlotTriple> old_ends = triangles_at(changed, anchors);
   for (const SlotTriple& triangle : old_ends) triangles_.remove(canonical(triangle));
   change();
@@ -98,7 +98,7 @@ void TriangleNet::update(Slot changed, std::vector<Slot>& anchors, Change&& chan
 
 void TriangleNet::exchange_others(Slot changed, const std::vector<Slot>& anchors,
                                   const std::vector<Neighbours>& lists_before) {
-  // Only those count that an anchor holds no longer, or newly.
+  // Only triangles matter that an anchor lost or gained.
   std::vector<SlotTriple> lost;
   std::vector<SlotTriple> gained;
   for (std::size_t i = 0; i < anchors.size(); ++i) {
@@ -109,7 +109,7 @@ void TriangleNet::exchange_others(Slot changed, const std::vector<Slot>& anchors
   sort_unique(lost);
   sort_unique(gained);
 
-  // A triangle exists as long as one of its corners holds it.
+  // A triangle exists as long as it is in the neighbourhood of one of its corners.
   const auto held_before = [&](Slot corner, const SlotTriple& triangle) {
     const auto it = std::lower_bound(anchors.begin(), anchors.end(), corner);
     const bool rewired = it != anchors.end() && *it == corner;
@@ -177,10 +177,10 @@ void TriangleNet::collect_anchors(Slot slot, const Eigen::Vector2d& position,
                           const Slot last = list.slot[list.count - 1];
                           const double farthest =
                               (grid_.position(last) - grid_.position(other)).squaredNorm();
-                          // In one place the lower ids are nearer: thousands of landmarks
-                          // there are not rewired for each that comes.
+                          // At equal positions the lower ids count as nearer, so a new landmark
+                          // does not change the neighbours of thousands at the same position.
                           if (squared == 0.0 && farthest == 0.0 && ids_[last] < ids_[slot]) return;
-                          // Generous by rounding: an anchor too many costs time only.
+                          // Allow for rounding: an extra anchor only costs time.
                           if (squared <= farthest * (1.0 + 1e-9)) anchors.push_back(other);
                         });
 }

@@ -1,4 +1,4 @@
-// The triangles that landmarks form with their nearest neighbours, kept true while landmarks
+// The triangles that landmarks form with their nearest neighbours, kept up to date while landmarks
 // change.
 #pragma once
 
@@ -13,25 +13,24 @@
 
 namespace understory::constellation {
 
-/// Sizes of the look-up structures of a map. They decide speed and memory; the last one also
-/// decides which triangles exist.
+/// Sizes of the look-up structures of a map. They decide speed and memory; max_neighbour_distance_m
+/// also decides which triangles exist.
 struct MapParameters {
-  double cell_m = 4.0;    ///< Of the grid.
-  double bucket_m = 0.5;  ///< Of side lengths.
+  double cell_m = 4.0;    ///< Cell of the grid.
+  double bucket_m = 0.5;  ///< Bucket of side lengths.
   /// Neighbours further away than this form no triangles [m].
   double max_neighbour_distance_m = 30.0;
 };
 
 /// Landmarks by slot: their positions in a grid, each one's nearest neighbours, and the triangles
-/// that follow. A change costs what it touches, and the result does not depend on the order of
-/// changes (ties between distances are broken by id). Slots are given out by the caller, densely
-/// from 0.
+/// that follow. A change costs only its neighbourhood, and the result does not depend on the order
+/// of changes (ties between distances are broken by id). The caller assigns slots, densely from 0.
 class TriangleNet {
  public:
-  /// Triangles are made among a landmark and two of its so many nearest neighbours.
+  /// Triangles are formed of a landmark and two of this many nearest neighbours.
   static constexpr std::size_t kNeighbours = 6;
 
-  /// Without landmarks.
+  /// An empty net.
   explicit TriangleNet(const MapParameters& parameters);
 
   /// Adds a landmark. Preconditions: the slot is free, the position representable by the grid.
@@ -61,22 +60,23 @@ class TriangleNet {
   };
 
   Neighbours nearest_neighbours(Slot slot) const;
-  /// Landmarks whose neighbours a landmark `slot` at `position` is, or would be.
+  /// Landmarks that have, or would have, a landmark `slot` at `position` among their neighbours.
   void collect_anchors(Slot slot, const Eigen::Vector2d& position,
                        std::vector<Slot>& anchors) const;
-  /// Triangles with that corner that the anchors' neighbourhoods hold: sorted, each once.
+  /// Triangles of the anchors' neighbourhoods with this corner: sorted, each once.
   std::vector<SlotTriple> triangles_at(Slot corner, const std::vector<Slot>& anchors) const;
-  /// Triangles that `anchor` holds with the neighbours `in` and not with `out`, without `except`.
+  /// Triangles of `anchor` that exist with the neighbours `in` and not with `out`, without
+  /// `except`.
   static void collect_difference(Slot anchor, const Neighbours& in, const Neighbours& out,
                                  Slot except, std::vector<SlotTriple>& triangles);
   static bool holds(Slot anchor, const Neighbours& list, const SlotTriple& triangle);
   Triangle canonical(const SlotTriple& triangle) const;
-  /// Brings neighbourhoods and triangles up to date around `changed` while `change` is made; `gone`
-  /// is `changed` if it is no longer there afterwards.
+  /// Brings neighbourhoods and triangles up to date around `changed` and calls `change` between;
+  /// `gone` is `changed` if the landmark is removed.
   template <class Change>
   void update(Slot changed, std::vector<Slot>& anchors, Change&& change, Slot gone = kNoSlot);
-  /// Removes and adds the triangles without the corner `changed` that the anchors' new lists of
-  /// neighbours no longer hold, or newly hold.
+  /// Of the triangles without the corner `changed`, removes and adds those by which the anchors'
+  /// old and new lists of neighbours differ.
   void exchange_others(Slot changed, const std::vector<Slot>& anchors,
                        const std::vector<Neighbours>& lists_before);
 

@@ -55,7 +55,7 @@ void TriangleIndex::remove(const Triangle& triangle) {
   const std::uint32_t index = directory_.find(key);
   assert(index != IndexTable::kNone);
   std::vector<Entry>& entries = buckets_[index];
-  // Corner by corner: the library's comparison of arrays goes byte by byte.
+  // Compare corner by corner: the standard library compares arrays byte by byte.
   const auto it = std::find_if(entries.begin(), entries.end(), [&](const Entry& entry) {
     return entry.vertex[0] == triangle.vertex[0] && entry.vertex[1] == triangle.vertex[1] &&
            entry.vertex[2] == triangle.vertex[2];

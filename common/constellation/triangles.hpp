@@ -1,4 +1,4 @@
-// Triangles of landmarks, found again by their side lengths.
+// Triangles of landmarks, indexed by their side lengths.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 namespace understory::constellation {
 
 /// A triangle in canonical order: vertex[0] lies opposite the longest side, vertex[2] opposite the
-/// shortest. Side lengths do not change under rigid motion; a mirror image turns `left` around.
+/// shortest. A rigid motion does not change side lengths; a mirror image inverts `left`.
 struct Triangle {
   std::array<Slot, 3> vertex{};
   std::array<float, 3> side_m{};  ///< Longest, middle, shortest.
@@ -51,8 +51,7 @@ class TriangleIndex {
   /// Memory held [bytes].
   std::size_t bytes() const;
 
-  /// How many triangles share the bucket of `triangle`: a quick estimate of the number of
-  /// candidates that it would give.
+  /// Number of triangles in the bucket of `triangle`: a quick estimate of its number of candidates.
   std::size_t crowd(const Triangle& triangle) const {
     return bucket(key_of(triangle.left, bins(triangle.side_m))).size();
   }

@@ -47,7 +47,7 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   return m;
 }
 
-/// exp of a rotation vector, and a translation, applied in front.
+/// The pose with exp of a rotation vector and a translation applied on the left.
 Eigen::Isometry3d perturbed(const Eigen::Isometry3d& pose, const Vector6& step) {
   const Eigen::Vector3d rotation = step.head<3>();
   const double angle = rotation.norm();
@@ -95,7 +95,7 @@ NormalEquations equations_at(std::span<const PointSighting> pairs,
   return equations;
 }
 
-/// Samples after which a good one was drawn with that confidence.
+/// Number of samples after which one without a wrong pair was drawn with this confidence.
 double samples_needed(double inlier_share, double confidence) {
   const double good = inlier_share * inlier_share * inlier_share;
   if (good >= 1.0) return 1.0;
@@ -114,7 +114,7 @@ std::array<PointSighting, 3> draw_three(std::span<const PointSighting> pairs,
   return {pairs[a], pairs[b], pairs[c]};
 }
 
-/// Least squares and a new choice of inliers, in turn.
+/// Alternates least squares and the choice of inliers.
 void settle(std::span<const PointSighting> pairs, const AbsolutePoseParameters& parameters,
             AbsolutePose& result) {
   constexpr int kRounds = 3;
@@ -126,7 +126,7 @@ void settle(std::span<const PointSighting> pairs, const AbsolutePoseParameters& 
   result.inliers = inliers_of(pairs, result.camera_T_map, parameters.threshold_rad);
 }
 
-/// The step that perturbed() takes from `from` to `to`.
+/// The step with which perturbed() moves `from` to `to`.
 Vector6 step_between(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
   const Eigen::Matrix3d turn = to.linear() * from.linear().transpose();
   const Eigen::AngleAxisd rotation(turn);
@@ -135,7 +135,7 @@ Vector6 step_between(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to)
   return step;
 }
 
-/// Pairs and prior together: what update_absolute_pose() makes least.
+/// Pairs and prior: the cost that update_absolute_pose() minimises.
 class WeighedPairs {
  public:
   WeighedPairs(std::span<const PointSighting> pairs, std::span<const double> weights,
@@ -146,7 +146,7 @@ class WeighedPairs {
         parameters_(parameters),
         prior_information_(prior.covariance.ldlt().solve(Matrix6::Identity())) {}
 
-  /// Minus twice the logarithm of the likelihood, but for a constant.
+  /// Minus twice the logarithm of the likelihood, up to a constant.
   double cost(const Eigen::Isometry3d& pose) const {
     const double threshold = parameters_.threshold_rad;
     double squares = 0.0;
@@ -158,7 +158,7 @@ class WeighedPairs {
     return squares / variance() + from_prior.dot(prior_information_ * from_prior);
   }
 
-  /// Gauss-Newton over the pairs that fit, chosen anew at each step.
+  /// Gauss-Newton over the pairs that fit; the choice is renewed at each step.
   Eigen::Isometry3d settled(Eigen::Isometry3d pose) const {
     constexpr int kSteps = 8;
     for (int i = 0; i < kSteps; ++i) {
@@ -198,7 +198,7 @@ class WeighedPairs {
   Matrix6 prior_information_;
 };
 
-/// The cheapest of the prior and of the poses from samples.
+/// The pose of least cost among the prior and the poses of samples.
 Eigen::Isometry3d best_guess(std::span<const PointSighting> pairs, const WeighedPairs& weighed,
                              const Eigen::Isometry3d& prior, int samples, std::uint64_t seed) {
   std::mt19937_64 random(seed);

@@ -8,7 +8,7 @@
 namespace understory::geometry {
 
 /// Weighted sums over point pairs, from which the best rigid motion follows in closed form (Umeyama
-/// 1991 without scale). Pairs can be added and removed one by one; each costs a dozen flops.
+/// 1991 without scale). Pairs can be added and removed one by one; each change costs a dozen flops.
 class RigidAlignment2 {
  public:
   /// Adds the pair `a` ~ a_T_b * `b` [m]. The weight is an inverse variance or any number in

@@ -1,4 +1,5 @@
-// Decompositions of small matrices, instantiated once: each costs seconds wherever it is compiled.
+// Decompositions of small matrices, instantiated once: each instantiation costs seconds of compile
+// time.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,16 +13,17 @@ struct PrincipalAxes {
   Eigen::Matrix2d vectors;
 };
 
-/// Of a symmetric 2x2 matrix; only its lower triangle is read. Not finite where the matrix is not.
+/// Principal axes of a symmetric 2x2 matrix; only its lower triangle is read. The result is not
+/// finite where the matrix is not.
 PrincipalAxes principal_axes(const Eigen::Matrix2d& symmetric);
 /// Eigenvalues of a symmetric 2x2 matrix, ascending.
 Eigen::Vector2d eigenvalues(const Eigen::Matrix2d& symmetric);
 /// Eigenvalues of a symmetric 3x3 matrix, ascending.
 Eigen::Vector3d eigenvalues(const Eigen::Matrix3d& symmetric);
 /// Inverse of a covariance or of an information: exactly symmetric and positive definite whatever
-/// its scales. A motion over a blind way is known to millimetres along one direction and to tens of
-/// metres along another: cofactors leave such an inverse asymmetric, or indefinite. Of a singular
-/// matrix what is nothing counts as 1e-15 of the largest eigenvalue.
+/// its scales. A motion without landmarks can have a sigma of millimetres in one direction and of
+/// tens of metres in another: an inverse by cofactors is then asymmetric or indefinite. Zero
+/// eigenvalues of a singular matrix count as 1e-15 of the largest one.
 Eigen::Matrix3d symmetric_inverse(const Eigen::Matrix3d& matrix);
 
 /// The shortest rotation that takes the direction `from` to the direction `to`; neither may be

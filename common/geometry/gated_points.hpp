@@ -1,4 +1,4 @@
-// Points with variances, and which of them lie inside a gate: at a bounded cost.
+// Points with variances, and a query for the points inside a gate, at bounded cost.
 #pragma once
 
 #include <array>
@@ -10,15 +10,15 @@
 
 namespace understory::geometry {
 
-/// A set of points, each with a variance. Vague points are kept by themselves, so that one of them
-/// widens no gate of the others. A gate around which more than kCrowd points lie finds none of
-/// them: nothing says which one it is.
+/// A set of points, each with a variance. Points of large variance ("vague") are stored apart, so
+/// that they do not widen the search for the others. If more than kCrowd points lie around a gate,
+/// the query returns none: the pair would be arbitrary.
 class GatedPoints {
  public:
-  /// More than any scene has around a gate.
+  /// More points than any scene has around a gate.
   static constexpr std::size_t kCrowd = 128;
 
-  /// Without points. Bins of side `bin_m` [m]; a point with a variance above `vague_m2` is vague.
+  /// An empty set. Bins of side `bin_m` [m]; a point with a variance above `vague_m2` is vague.
   explicit GatedPoints(double bin_m = 1.0, double vague_m2 = 1.0)
       : bin_m_(bin_m), vague_m2_(vague_m2) {}
 
@@ -29,7 +29,7 @@ class GatedPoints {
     tier.positions.push_back(position_m);
     tier.max_variance_m2 = std::max(tier.max_variance_m2, variance_m2);
   }
-  /// To be called behind the last add(), before the first query. O(n log n).
+  /// Call it after the last add() and before the first query. O(n log n).
   void sort() {
     for (Tier& tier : tiers_) tier.rows = PointRows(tier.positions, bin_m_);
   }

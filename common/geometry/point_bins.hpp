@@ -49,7 +49,7 @@ class PointBins {
   int rows_ = 0;
   std::vector<std::uint32_t> starts_;
   std::vector<std::uint32_t> indices_;
-  std::vector<Eigen::Vector2d> points_;  ///< In order of bins.
+  std::vector<Eigen::Vector2d> points_;  ///< Sorted by bin.
 };
 
 }  // namespace understory::geometry

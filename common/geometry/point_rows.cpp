@@ -21,7 +21,7 @@ PointRows::PointRows(std::span<const Eigen::Vector2d> points, double bin_m)
   origin_ = points.front();
   for (const Eigen::Vector2d& point : points) origin_ = origin_.cwiseMin(point);
 
-  // In order of row, column and index.
+  // Sort by row, column and index.
   std::vector<std::uint64_t> place(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector2d offset = points[i] - origin_;

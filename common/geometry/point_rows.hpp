@@ -1,4 +1,4 @@
-// Points of the plane in rows of square bins, for range queries whose cost no point can spoil.
+// Points of the plane in rows of square bins, for range queries of bounded cost.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,13 +18,13 @@ class PointRows {
   /// Sorts `points` [m] into bins of side `bin_m` that begin at the lowest coordinates.
   PointRows(std::span<const Eigen::Vector2d> points, double bin_m);
 
-  /// Number of points in the bins that the square around the circle touches: what
-  /// for_each_within() would look at. O(rows of these bins * log(n)).
+  /// Number of points in the bins that the square around the circle touches: the points that
+  /// for_each_within() tests. O(rows of these bins * log(n)).
   std::size_t count_around(const Eigen::Vector2d& centre, double radius_m) const;
 
   /// Calls f(index, squared distance [m^2]) for every point within `radius_m` of `centre`, row by
-  /// row of bins, in a row bin by bin, in a bin in order of index. Cost: that of count_around() and
-  /// the points that it counts.
+  /// row of bins, in a row bin by bin, in a bin in order of index. Cost: count_around(), and O(1)
+  /// for each point that it counts.
   template <typename F>
   void for_each_within(const Eigen::Vector2d& centre, double radius_m, F&& f) const {
     const double limit = radius_m * radius_m;
@@ -39,7 +39,7 @@ class PointRows {
  private:
   struct Row {
     std::int32_t number = 0;
-    std::uint32_t begin = 0;  ///< Of its points; it ends where the next one begins.
+    std::uint32_t begin = 0;  ///< Index of its first point; the row ends where the next one begins.
   };
 
   std::int32_t bin(double offset_m) const;
@@ -52,7 +52,7 @@ class PointRows {
     const std::int32_t first_column = bin(offset.x() - radius_m);
     const std::int32_t last_column = bin(offset.x() + radius_m);
 
-    // The last row only says where the one before it ends.
+    // The last row is empty: it only marks the end of the row before it.
     auto row = std::ranges::lower_bound(rows_, bin(offset.y() - radius_m), {}, &Row::number);
     for (; row + 1 < rows_.end() && row->number <= last_row; ++row) {
       const auto begin = columns_.begin() + row->begin;
@@ -66,8 +66,8 @@ class PointRows {
 
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   double inverse_bin_ = 1.0;
-  std::vector<Row> rows_;              ///< That have points, ascending, and one behind them.
-  std::vector<std::int32_t> columns_;  ///< Of each point, in the order of `points_`.
+  std::vector<Row> rows_;              ///< Rows with points, ascending, and one end marker.
+  std::vector<std::int32_t> columns_;  ///< Column of each point, in the order of `points_`.
   std::vector<std::uint32_t> indices_;
   std::vector<Eigen::Vector2d> points_;
 };

@@ -107,7 +107,7 @@ class Registrar {
     return reference_count_[c.reference] > 1 || observed_count_[c.observed] > 1;
   }
 
-  /// Those pairs of which neither end has another candidate, in order of `observed`.
+  /// Pairs in which neither point has another candidate, in order of `observed`.
   std::vector<PointPair> unambiguous_pairs_at(const Registration& at) {
     collect_candidates(at);
     count_candidates();
@@ -118,7 +118,7 @@ class Registrar {
     return pairs;
   }
 
-  /// One to one, likeliest first. A pair is ambiguous where either end had another candidate.
+  /// One to one, likeliest first. A pair is ambiguous where either point had another candidate.
   std::vector<PointPair> pairs_at(const Registration& at) {
     // The candidates inside the gates, likeliest first; ties go by index.
     collect_candidates(at);
@@ -185,7 +185,7 @@ class Registrar {
   std::vector<bool> reference_used_, observed_used_;
 };
 
-/// The points nearest to the observer; all of them where they are few. In their order.
+/// The points nearest to the observer, in their given order; all points where they are few.
 std::vector<UncertainPoint> nearest_points(Points points) {
   std::vector<UncertainPoint> result(points.begin(), points.end());
   if (points.size() <= kMostSearched) return result;
@@ -216,12 +216,12 @@ Registration register_step(Points reference, Points observed, const SE2& last, c
   const double r2 = model.sigma_rad * model.sigma_rad;
   const Eigen::Matrix3d covariance = Eigen::Vector3d(t2, t2, r2).asDiagonal();
 
-  // The last step repeats.
+  // First guess: the last step repeats.
   Registrar all(reference, observed, parameters);
   Registration best = all.run({last * last_step, covariance});
   if (fits(best)) return best;
 
-  // It did not: rotations on the spot, with the nearest points.
+  // It did not repeat: try rotations on the spot with the nearest points.
   const std::vector<UncertainPoint> nearest = nearest_points(observed);
   const bool has_all = nearest.size() == observed.size();
   Registrar search(reference, nearest, parameters, kMostSearchCandidates);
@@ -237,7 +237,7 @@ Registration register_step(Points reference, Points observed, const SE2& last, c
     best_rotation = rotated;
   }
 
-  // The best one with all points.
+  // Register the best one with all points.
   if (has_all) return found;
   if (best_rotation) best = all.run({*best_rotation, covariance});
   return best;

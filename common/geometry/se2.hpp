@@ -22,7 +22,7 @@ class SE2 {
   /// The heading is wrapped into (-pi, pi].
   SE2(double x_m, double y_m, double theta_rad)
       : translation_(x_m, y_m), theta_(wrap_angle(theta_rad)) {}
-  /// Likewise.
+  /// The heading is wrapped into (-pi, pi].
   SE2(const Eigen::Vector2d& translation_m, double theta_rad)
       : translation_(translation_m), theta_(wrap_angle(theta_rad)) {}
 

@@ -1,7 +1,7 @@
 // Lambda Twist: M. Persson, K. Nordberg, "Lambda Twist: An Accurate Fast Robust Perspective Three
 // Point (P3P) Solver", ECCV 2018. The distances lambda of three points fulfil three quadratic
-// equations lambda' M_ij lambda = a_ij; two combinations of them are 0 on the right, and some
-// member of their pencil is a pair of planes.
+// equations lambda' M_ij lambda = a_ij; two linear combinations of them have a zero right side, and
+// a member of the pencil of these two is a pair of planes.
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -23,8 +23,8 @@ struct Distances {
   Eigen::Vector3d b;
 };
 
-/// A real root of x^3 + b x^2 + c x + d; of three the outer one where the slope is greater, which
-/// is the best conditioned one.
+/// A real root of x^3 + b x^2 + c x + d; of three real roots the outer one with the greater slope,
+/// which is the best conditioned.
 double cubic_root(double b, double c, double d) {
   const double shift = -b / 3.0;
   const double p = c - b * b / 3.0;
@@ -33,7 +33,7 @@ double cubic_root(double b, double c, double d) {
 
   double root = 0.0;
   if (discriminant >= 0.0) {
-    // One real root; no difference of nearly equal numbers.
+    // One real root; the form avoids a difference of nearly equal numbers.
     const double u = std::cbrt(-0.5 * q - std::copysign(std::sqrt(discriminant), q));
     root = u == 0.0 ? 0.0 : u - p / (3.0 * u);
   } else {
@@ -115,7 +115,7 @@ void solve_in_plane(double w0, double w1, const Distances& known,
   const double qa = (a13 - a12) * w1 * w1 - a12 * b13 * w1 - a12;
   const double qb = a13 * b12 * w1 - a12 * b13 * w0 - 2.0 * w0 * w1 * (a12 - a13);
   const double qc = (a13 - a12) * w0 * w0 + a13 * b12 * w0 + a13;
-  // A double root that rounding has made complex is one.
+  // Rounding can make a double root complex: count it as real.
   const double discriminant = qb * qb - 4.0 * qa * qc;
   if (discriminant < -1e-12 * qb * qb || qa == 0.0) return;
 
@@ -153,7 +153,7 @@ std::vector<Eigen::Vector3d> solve_distances(const Distances& known) {
   return solutions;
 }
 
-/// Three vectors that a rotation takes along: two sides of the triangle and its normal.
+/// Three vectors that rotate with the triangle: two sides and the normal.
 Eigen::Matrix3d sides(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
                       const Eigen::Vector3d& p2) {
   Eigen::Matrix3d m;

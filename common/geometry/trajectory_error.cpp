@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-/// The true path from the first pose to each [m].
+/// Length of the true path from the first pose to each pose [m].
 std::vector<double> paths_m(std::span<const PosePair> poses) {
   std::vector<double> paths(poses.size(), 0.0);
   for (std::size_t i = 1; i < poses.size(); ++i) {
@@ -22,7 +22,7 @@ std::vector<double> paths_m(std::span<const PosePair> poses) {
   return paths;
 }
 
-/// The pose behind `from` whose path from there is nearest to `length_m`, the first of equal ones.
+/// The later pose whose path from `from` is nearest to `length_m`; of equal ones the first.
 std::optional<std::size_t> pose_after(const std::vector<double>& paths_m, std::size_t from,
                                       double length_m) {
   const auto behind = paths_m.begin() + static_cast<std::ptrdiff_t>(from) + 1;
@@ -38,7 +38,7 @@ std::optional<std::size_t> pose_after(const std::vector<double>& paths_m, std::s
   return static_cast<std::size_t>(best - paths_m.begin());
 }
 
-/// Root of the mean of squares whose sum is given.
+/// Root mean square, from the sum of the squares.
 double root_mean(double sum_of_squares, std::size_t count) {
   return std::sqrt(sum_of_squares / static_cast<double>(count));
 }

@@ -32,9 +32,9 @@ std::optional<AbsoluteError> aligned_error(std::span<const PosePair> poses);
 struct RelativeError {
   std::size_t pairs = 0;
   double translation_rms_m = 0.0;
-  double translation_mean_percent = 0.0;  ///< Of the true path of each pair.
+  double translation_mean_percent = 0.0;  ///< Mean of error / true path of each pair.
   double rotation_rms_deg = 0.0;
-  double rotation_mean_deg_per_m = 0.0;  ///< Of the true path of each pair.
+  double rotation_mean_deg_per_m = 0.0;  ///< Mean of error / true path of each pair.
 };
 /// The share of a length by which the true path of a pair may differ from it.
 inline constexpr double kPathTolerance = 0.1;
@@ -44,41 +44,41 @@ inline constexpr double kPathTolerance = 0.1;
 /// nearest to `length_m`, if it differs by at most a tenth. The path is the sum of the distances
 /// between successive poses. RMS values are those of evo_rpe; means for each metre of path are
 /// those of the KITTI odometry benchmark, which takes every tenth pose as i, the first j beyond the
-/// length, and divides by the length. A pair within two maps is left out. None where the drive has
-/// no such pair. O(n log n).
+/// length, and divides by the length. A pair of poses in different maps is left out. None where the
+/// drive has no pair. O(n log n).
 std::optional<RelativeError> relative_error(std::span<const PosePair> poses, double length_m);
 
-/// How well the truth is known itself: standard deviations of each of its poses, 0 = exact.
+/// Accuracy of the truth itself: standard deviations of each true pose, 0 = exact.
 struct TruthSigma {
   double position_m = 0.0;  ///< Per axis.
   double heading_rad = 0.0;
 };
-/// The covariance that the truth's own errors add to that of a pose's error (tangent of the
-/// vehicle; x, y, theta [m, rad]): those of this pose, and those of the true pose to which the map
-/// is tied, moved to here. `tie_T_vehicle`: from that pose to this one; none where the map is tied
-/// by many poses, whose errors average out.
+/// The covariance that errors of the truth add to the covariance of a pose's error (tangent of the
+/// vehicle; x, y, theta [m, rad]): errors of the true pose here, and of the true pose that ties the
+/// map, transformed to here. `tie_T_vehicle`: motion from the tie pose to this one; none where many
+/// poses tie the map and their errors average out.
 Eigen::Matrix3d covariance_of_truth(const TruthSigma& sigma,
                                     const std::optional<SE2>& tie_T_vehicle);
 
 /// Normalised estimation error squared (NEES) of a pose: e^T covariance^-1 e with
 /// e = Log(estimate^-1 * truth), three degrees of freedom. None where the covariance is not
-/// positive definite or not finite (a zero one states nothing).
+/// positive definite or not finite (a zero covariance has no meaning).
 std::optional<double> nees(const PosePair& pose, const Eigen::Matrix3d& covariance);
 
 /// The band that holds 95 % of chi^2 of three degrees of freedom, 2.5 % below and 2.5 % above it.
 inline constexpr double kNeesBandLow = 0.2157952826238981;
 inline constexpr double kNeesBandHigh = 9.348403604496148;
 
-/// What many values of NEES come to. Those of one drive are correlated: their mean scatters more
-/// than that of as many independent ones.
+/// Statistics of many values of NEES. Values of one drive are correlated: their mean scatters more
+/// than the mean of as many independent values.
 struct NeesSummary {
   std::size_t count = 0;
-  double mean = 0.0;           ///< 3 expected.
-  double median = 0.0;         ///< 2.37 expected.
-  double share_in_band = 0.0;  ///< 0.95 expected.
-  double share_above = 0.0;    ///< 0.025 expected: more says that sigmas are too small.
+  double mean = 0.0;           ///< Expected: 3.
+  double median = 0.0;         ///< Expected: 2.37.
+  double share_in_band = 0.0;  ///< Expected: 0.95.
+  double share_above = 0.0;    ///< Expected: 0.025; more means that sigmas are too small.
 };
-/// None of no values. O(n).
+/// None where `nees` is empty. O(n).
 std::optional<NeesSummary> summary_of(std::vector<double> nees);
 
 }  // namespace understory::geometry
