@@ -1,4 +1,4 @@
-// What a process publishes about itself besides HEALTH: LOG and CONFIG.
+// Publishes LOG and CONFIG of a process.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace understory::bus {
 
-/// How urgent a line of LOG is; the numbers are those of log_t.
+/// Severity of a line of LOG, numbered as in log_t.
 enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarning, kError };
 
 /// Publishes LOG and CONFIG under the process's name and numbers them.
@@ -21,19 +21,20 @@ class Announcer {
   /// `bus` must outlive it.
   Announcer(Bus& bus, std::string process, std::string version);
 
-  /// While muted nothing is published or numbered: a recovery repeats what was published before.
+  /// While muted, nothing is published or numbered: a recovery repeats messages that were published
+  /// before.
   void mute(bool is_muted) { is_muted_ = is_muted; }
 
   /// One line of LOG. `utime`: message time [us]; -1 (none yet) becomes 0.
   void log(std::int64_t utime, LogLevel level, std::string_view code, std::string_view text,
            std::string_view channel);
-  /// A line of LOG for the 1st, 2nd, 4th, 8th ... of each reason and channel: a flood of bad input
-  /// must not become a flood of LOG.
+  /// Publishes a line of LOG for the 1st, 2nd, 4th, 8th ... report of each reason and channel: a
+  /// flood of bad input must not cause a flood of LOG.
   void report(std::int64_t utime, wire::Reason reason, std::string_view text,
               std::string_view channel);
-  /// A line of LOG for each kind of datagram that was refused, when its count has doubled.
+  /// Publishes a line of LOG for each kind of refused datagram whose count has doubled.
   void report_refused(std::int64_t utime, const DatagramFaults& faults);
-  /// The configuration in force.
+  /// Publishes the configuration in force.
   void config(std::int64_t utime, const std::string& toml);
 
  private:

@@ -10,7 +10,7 @@
 
 namespace understory::bus {
 
-// A flood of large messages may fill memory up to this for each subscription [bytes].
+// Limit of memory for each subscription in a flood of large messages [bytes].
 ArrivalQueue::ArrivalQueue()
     : queue_(kLargestMessage), event_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (event_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");

@@ -8,7 +8,7 @@ namespace understory::bus {
 /// The bus cannot be joined; what() names the URL.
 class BusError : public std::runtime_error {
  public:
-  /// From the one-line message that what() gives.
+  /// Takes the one-line message for what().
   using std::runtime_error::runtime_error;
 };
 

@@ -1,5 +1,5 @@
 // The channels of a service, declared in one place: --help, the diagram of services/README.md and
-// the check of what an adapter binds all follow from it.
+// the check of an adapter's channels follow from it.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace understory::bus {
 
-/// Direction of a channel, as its service sees it.
+/// Direction of a channel, seen from its service.
 enum class Flow : std::uint8_t { kIn, kOut };
 
 /// One channel that a service subscribes (kIn) or publishes (kOut).
@@ -17,16 +17,16 @@ struct ChannelUse {
   Flow flow = Flow::kIn;
   std::string channel;
   std::string text;          ///< One line for people: its content.
-  bool is_optional = false;  ///< A parameter decides; `text` names it.
+  bool is_optional = false;  ///< A parameter turns it on; `text` names the parameter.
 };
 
-/// What an adapter has bound: a direction and a name without suffix.
+/// A channel that an adapter has bound: direction, and name without suffix.
 struct BoundChannel {
   Flow flow = Flow::kIn;
   std::string channel;
 };
 
-/// Filled by the struct that names a service's channels, while that struct is made:
+/// The struct with a service's channel names fills it in its initialisers:
 ///   struct EkfChannels {
 ///     bus::ChannelList all;
 ///     std::string odometry = all.in("ODOMETRY", "motion without landmarks");
@@ -34,9 +34,9 @@ struct BoundChannel {
 ///   };
 class ChannelList {
  public:
-  /// Nothing but channels.
+  /// A service without input or output beside the bus.
   ChannelList() = default;
-  /// `source` and `sink`: what the service reads or gives beside the bus (a socket, a web page).
+  /// `source` and `sink`: the service's input and output beside the bus (a socket, a web page).
   explicit ChannelList(std::string source, std::string sink = "")
       : source_(std::move(source)), sink_(std::move(sink)) {}
 

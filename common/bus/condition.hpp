@@ -1,4 +1,4 @@
-// Conditions of a service: what is wrong as long as it is wrong, by its latest events.
+// Conditions of a service: a fault that holds or not, judged by the latest events.
 #pragma once
 
 #include <cstdint>
@@ -9,25 +9,25 @@
 
 namespace understory::bus {
 
-/// When a condition begins and ends. It counts events of its kind (scans, keyframes, messages), not
-/// seconds: a slow vehicle and a fast one are judged alike.
+/// Limits for the begin and the end of a condition. It counts events (scans, keyframes, messages),
+/// not seconds: a slow and a fast vehicle are judged alike.
 struct ConditionLimits {
   int window = 20;    ///< Latest events that count; 1 .. 64.
-  int raise_at = 10;  ///< Bad ones among them with which it begins; at most `window`.
+  int raise_at = 10;  ///< It begins with this many bad events among them; at most `window`.
 };
 
-/// Holds from `raise_at` bad events of the latest `window` until no more than a quarter of
-/// `raise_at` is left: it does not flicker.
+/// Begins at `raise_at` bad events among the latest `window` and ends at a quarter of `raise_at`:
+/// this hysteresis prevents flicker.
 class Condition {
  public:
-  /// Nothing was bad so far.
+  /// Starts without bad events.
   explicit Condition(const ConditionLimits& limits = {}) : limits_(limits) {}
 
-  /// The next event.
+  /// Adds the next event.
   void add(bool is_bad);
   /// Whether it holds now.
   bool holds() const { return holds_; }
-  /// Bad ones of the latest events.
+  /// Number of bad events among the latest `window`.
   int bad() const;
 
   /// Members of a saved state; see common/state. The limits are configuration.
@@ -45,8 +45,9 @@ class Condition {
 /// A condition with the reason that HEALTH shows while it holds.
 struct WatchedCondition {
   wire::Reason reason = wire::Reason::kLost;
-  std::string_view text;     ///< For a person.
-  std::string_view channel;  ///< That it concerns; may be empty. Two of one reason differ in it.
+  std::string_view text;     ///< Text for people.
+  std::string_view channel;  ///< Channel of the condition; may be empty. Two conditions of one
+                             ///< reason differ in it.
   Condition condition;
 
   /// Members of a saved state; see common/state. The rest is constant.
@@ -56,8 +57,8 @@ struct WatchedCondition {
   }
 };
 
-/// Lists the limits as `health.NAME_window` and `health.NAME_raise_at`. `unit`: of the events;
-/// `what`: which of them are bad.
+/// Adds the limits to the table as `health.NAME_window` and `health.NAME_raise_at`. `unit`: unit of
+/// the events; `what`: the bad events in words.
 void describe(ConditionLimits& limits, const std::string& name, const std::string& unit,
               const std::string& what, ParameterTable& table);
 

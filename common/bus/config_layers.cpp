@@ -51,7 +51,7 @@ toml::table parse_config(std::string_view toml, const std::string& name) {
 }
 
 std::vector<ConfigLayer> config_layers(std::string_view toml, const std::string& name) {
-  // Moved, never copied: a copy of a table has forgotten its lines.
+  // Moved, never copied: a copy of a table loses its line numbers.
   std::vector<ConfigLayer> layers;
   layers.push_back({name, parse_config(toml, name)});
   std::vector<std::filesystem::path> files{name};

@@ -22,12 +22,12 @@ std::uint32_t big_endian_32(Bytes bytes, std::size_t at) {
   return (std::uint32_t{big_endian_16(bytes, at)} << 16U) | big_endian_16(bytes, at + 2);
 }
 
-/// Printable ASCII without spaces: what a log keeps and a terminal shows unharmed.
+/// Printable ASCII without spaces: safe in a log and on a terminal.
 bool is_plain(std::uint8_t c) { return c > 0x20 && c < 0x7F; }
 
-/// A channel with its NUL, and what comes behind it.
+/// Splits a channel with its NUL from the bytes after it.
 std::variant<ShortMessage, DatagramFault> split_channel(Bytes bytes) {
-  // A NUL beyond the longest name cannot make it valid: no need to look further.
+  // A NUL beyond the longest name cannot make it valid: the search can stop there.
   const Bytes head = bytes.first(std::min(bytes.size(), kLongestChannelName + 1));
   const auto end = std::find(head.begin(), head.end(), std::uint8_t{0});
   if (end == head.end()) {
@@ -49,7 +49,7 @@ std::variant<ShortMessage, Fragment, DatagramFault> decode_fragment(Bytes bytes)
   fragment.count = big_endian_16(bytes, 18);
   fragment.payload = bytes.subspan(kFragmentHeaderBytes);
 
-  // What the header promises. Every fragment but the first has a byte of its own at least.
+  // Check the header. Every fragment but the first has at least one byte of payload.
   if (fragment.message_size > kLargestMessage) return DatagramFault::kTooLarge;
   if (fragment.number >= fragment.count) return DatagramFault::kBadCount;
   if (fragment.count - 1U > fragment.message_size) return DatagramFault::kBadCount;
@@ -64,7 +64,7 @@ std::variant<ShortMessage, Fragment, DatagramFault> decode_fragment(Bytes bytes)
     return DatagramFault::kTooShort;
   }
 
-  // Without a sum: offset + size would wrap.
+  // Written without a sum, because offset + size could wrap.
   if (fragment.offset > fragment.message_size ||
       fragment.payload.size() > fragment.message_size - fragment.offset) {
     return DatagramFault::kOutOfBounds;

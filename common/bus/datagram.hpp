@@ -1,4 +1,4 @@
-// One datagram of LCM's wire format over UDP, decoded and checked by itself.
+// One datagram of LCM's wire format over UDP, decoded and checked alone.
 //
 // A short message: 'LC02', sequence number (u32), channel, NUL, payload. A fragment: 'LC03',
 // sequence number (u32), size of the message's payload (u32), offset of this part in it (u32),
@@ -25,15 +25,15 @@ struct ShortMessage {
 struct Fragment {
   std::uint32_t sequence = 0;             ///< Of the message, counted by its sender.
   std::uint32_t message_size = 0;         ///< Bytes of the whole payload, at most 2^28.
-  std::uint32_t offset = 0;               ///< Where this part begins in it [bytes].
+  std::uint32_t offset = 0;               ///< Offset of this part in it [bytes].
   std::uint16_t number = 0;               ///< Below `count`.
   std::uint16_t count = 0;                ///< Fragments of the message, at least 1.
-  std::string_view channel;               ///< Of fragment 0; empty in all others.
+  std::string_view channel;               ///< Channel in fragment 0; empty in all others.
   std::span<const std::uint8_t> payload;  ///< offset + size <= message_size.
 };
 
-/// Decodes a datagram, or says what is wrong with it. Reads nothing outside the bytes; what it
-/// gives keeps the bounds that Fragment states. No allocation.
+/// Decodes a datagram, or returns its fault. Reads nothing outside the bytes; its results keep the
+/// bounds stated in Fragment. No allocation.
 std::variant<ShortMessage, Fragment, DatagramFault> decode_datagram(
     std::span<const std::uint8_t> bytes);
 

@@ -1,4 +1,4 @@
-// Why a datagram of the bus was refused, and how often each of these came.
+// Faults of the bus's datagrams, and their counts.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace understory::bus {
 
-/// What is wrong with a datagram, or with the message that it was a part of.
+/// The fault of a datagram, or of its message.
 enum class DatagramFault : std::uint8_t {
   kTooShort,       ///< Ends before its header does.
   kBadMagic,       ///< Neither a message nor a fragment of LCM's.
@@ -17,11 +17,12 @@ enum class DatagramFault : std::uint8_t {
   kTooLarge,       ///< States a message of more than 2^28 bytes.
   kBadCount,       ///< No fragments, more fragments than bytes, or a number beyond the last.
   kOutOfBounds,    ///< Offset and size reach beyond the stated size, or wrap.
-  kContradictory,  ///< States another size, number of fragments or content than the ones before.
-  kRepeated,       ///< A fragment that was there already: harmless, two routes to one group.
-  kOverlapping,    ///< Bytes that another fragment has brought.
+  kContradictory,  ///< States another size, number of fragments or content than earlier fragments.
+  kRepeated,       ///< The same fragment a second time: harmless (two routes to one group).
+  kOverlapping,    ///< Contains bytes of an earlier fragment.
   kNoRoom,         ///< Reassembly is full: dropped by the rules of UdpmReassembler.
-  kIncomplete,     ///< Fragments of a message that did not come in time; counted once a message.
+  kIncomplete,     ///< Fragments of the message are missing after the time limit; counted once per
+                   ///< message.
   kFromOutside,    ///< From another computer, on a bus of TTL 0.
 };
 inline constexpr std::size_t kDatagramFaults = 13;
@@ -29,23 +30,23 @@ inline constexpr std::size_t kDatagramFaults = 13;
 /// Name of the fault as HEALTH shows it, lower_snake with `datagram_` in front.
 std::string_view to_string(DatagramFault fault);
 
-/// False for what costs nothing and is only counted: a repetition, and what others say.
+/// False for faults without loss, which are only counted: repetitions, and datagrams from outside.
 constexpr bool is_harmful(DatagramFault fault) {
   return fault != DatagramFault::kRepeated && fault != DatagramFault::kFromOutside;
 }
 
-/// Counts by fault; a plain value.
+/// Counts by fault.
 class DatagramFaults {
  public:
   /// Counts one.
   void add(DatagramFault fault) { ++counts_[static_cast<std::size_t>(fault)]; }
-  /// Sets one count.
+  /// Sets the count of a fault.
   void set(DatagramFault fault, std::uint64_t count) {
     counts_[static_cast<std::size_t>(fault)] = count;
   }
-  /// Adds all of another's.
+  /// Adds the counts of another object.
   void add(const DatagramFaults& others);
-  /// How often this fault came.
+  /// Number of datagrams with this fault.
   std::uint64_t count_of(DatagramFault fault) const {
     return counts_[static_cast<std::size_t>(fault)];
   }

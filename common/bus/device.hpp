@@ -1,4 +1,4 @@
-// A device beside the bus (a sensor's socket, a serial line) that a process reads itself.
+// A device beside the bus (a sensor's socket, a serial line) that a process reads by itself.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace understory::bus {
 
-/// Folder in a process's state directory with what people keep, which no program deletes with the
+/// Folder in a process's state directory for files that people keep; no program deletes it with the
 /// state.
 inline constexpr const char* kKeptFolder = "maps";
 
@@ -17,17 +17,17 @@ inline constexpr const char* kKeptFolder = "maps";
 class Device {
  public:
   virtual ~Device() = default;
-  /// Before open(), where the process keeps its state in a directory: what the device writes may be
-  /// there, too.
+  /// Called before open() if the process has a state directory: the device may write its files
+  /// there.
   virtual void set_state_directory(const std::filesystem::path& /*directory*/) {}
-  /// Before the process connects to the bus. Throws where the device cannot be opened; what()
-  /// names it.
+  /// Called before the process connects to the bus. Throws where the device cannot be opened;
+  /// what() names it.
   virtual void open() = 0;
-  /// Each is readable when there is something to take in; they stay the same after open().
+  /// Descriptors that are readable when input waits; constant after open().
   virtual std::vector<int> file_descriptors() const = 0;
-  /// Takes in what has come and publishes. Short: it holds up everything else of the process.
+  /// Reads the waiting input and publishes. It must be short: it blocks the rest of the process.
   virtual void attend(std::int64_t monotonic_us) = 0;
-  /// The longest wait until the next attend() where nothing comes [ms].
+  /// The longest time until the next attend() without input [ms].
   virtual int wait_ms() const = 0;
 };
 

@@ -14,7 +14,7 @@ namespace understory::bus {
 /// The queues of all subscriptions of one bus.
 class DispatchQueue {
  public:
-  /// A message that was taken out, and who wants it.
+  /// A message taken from the queue, and its handler.
   struct Delivery {
     std::string channel;
     std::vector<std::uint8_t> bytes;
@@ -22,25 +22,26 @@ class DispatchQueue {
     const Bus::Handler* handler = nullptr;  ///< Valid as long as the queue is.
   };
 
-  /// Each subscription holds at most `most_bytes` besides the message that came last.
+  /// Each subscription stores at most `most_bytes` besides the newest message.
   explicit DispatchQueue(std::size_t most_bytes = std::numeric_limits<std::size_t>::max())
       : most_bytes_(most_bytes) {}
 
-  /// Adds a subscription of `channel` (exact name) that holds `queue_size` messages (0 = no limit).
+  /// Adds a subscription of `channel` (exact name) for at most `queue_size` waiting messages (0 =
+  /// no limit).
   void subscribe(std::string_view channel, std::size_t queue_size, Bus::Handler handler);
   /// The same for the messages of all channels.
   void subscribe_all(std::size_t queue_size, Bus::Handler handler);
-  /// Whether there is a subscription of this channel, or one of all.
+  /// Whether this channel, or all channels, are subscribed.
   bool takes(std::string_view channel) const;
   /// Copies a message to every subscription of the channel; where one is full, its oldest is
   /// dropped and counted.
   void push(std::string_view channel, std::span<const std::uint8_t> bytes,
             std::int64_t received_us);
-  /// Takes out the message that came first; none = nothing waits.
+  /// Takes out the oldest message; none = no message waits.
   std::optional<Delivery> take_one();
-  /// Calls the handler of the message that came first; false = nothing waits.
+  /// Calls the handler of the oldest message; false = no message waits.
   bool handle_one();
-  /// True when nothing waits.
+  /// True when no message waits.
   bool empty() const { return waiting_ == 0; }
   /// Messages dropped from the full queues of this channel so far.
   std::uint64_t dropped(std::string_view channel) const;
@@ -51,7 +52,7 @@ class DispatchQueue {
   struct Waiting {
     std::uint64_t ticket = 0;  // counts arrivals over all subscriptions
     std::int64_t received_us = 0;
-    std::string channel;  // where the subscription has many; else empty
+    std::string channel;  // for subscriptions of all channels; else empty
     std::vector<std::uint8_t> bytes;
   };
   struct Subscription {
@@ -59,7 +60,7 @@ class DispatchQueue {
     std::size_t queue_size = 0;
     Bus::Handler handler;
     std::deque<Waiting> queue = {};
-    std::size_t bytes = 0;  // in the queue
+    std::size_t bytes = 0;  // of the queue
     std::uint64_t dropped = 0;
   };
 
@@ -67,7 +68,7 @@ class DispatchQueue {
 
   std::size_t most_bytes_;
 
-  std::deque<Subscription> subscriptions_;  // a deque: handlers may subscribe while one runs
+  std::deque<Subscription> subscriptions_;  // a deque: handlers may subscribe while running
   std::uint64_t next_ticket_ = 0;
   std::size_t waiting_ = 0;
 };

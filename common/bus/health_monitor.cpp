@@ -96,7 +96,7 @@ health_t HealthMonitor::report(std::int64_t message_utime) {
   const double seconds = static_cast<double>(now - reported_us_) * 1e-6;
   reported_us_ = now;
 
-  // Who it is, and how it is.
+  // Identity and state.
   health_t out{};
   out.utime = clock_.wall_us();
   out.seq = sequence_++;
@@ -110,14 +110,14 @@ health_t HealthMonitor::report(std::int64_t message_utime) {
   out.rss_bytes = resident_memory_bytes();
   out.snapshot_utime = -1;
 
-  // How fast it is.
+  // Latency.
   const LatencyHistogram window = latencies_.report();
   out.latency_p50_us = window.quantile(0.5);
   out.latency_p90_us = window.quantile(0.9);
   out.latency_p99_us = window.quantile(0.99);
   out.latency_max_us = window.max();
 
-  // What came and went, and what was wrong.
+  // Channels and reasons.
   for (Channel& channel : channels_) out.channels.push_back(channel_report(channel, seconds));
   out.num_channels = static_cast<std::int32_t>(out.channels.size());
   reasons_.fill(out);

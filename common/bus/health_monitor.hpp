@@ -1,4 +1,4 @@
-// How a process is: counts, rates, latencies, and the state that follows from them.
+// The health of a process: counts, rates, latencies, and the resulting state.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@
 
 namespace understory::bus {
 
-/// Latencies since about two reports ago: percentiles do not jump when a report is due.
+/// Latencies since the report before the last one, so that percentiles do not jump at a report.
 class LatencyWindow {
  public:
   /// Counts one latency [us].
@@ -33,21 +33,21 @@ class LatencyWindow {
   LatencyHistogram before_;
 };
 
-/// Collects what HEALTH publishes about one process.
+/// Collects the values of one process for HEALTH.
 class HealthMonitor {
  public:
   /// `process` and `version` as HEALTH shows them.
   HealthMonitor(std::string process, std::string version, Clock clock);
 
-  /// Adds a channel; gives its number. HEALTH lists channels in the order of adding.
+  /// Adds a channel; returns its index. HEALTH lists channels in the order of adding.
   std::size_t add_channel(std::string name, bool is_output);
   /// Counts a message on a channel, by its stamp [us].
   void count_message(std::size_t channel, std::int64_t utime);
   /// Counts the time from receiving a message to the end of its handler [us].
   void count_latency(std::int64_t microseconds) { latencies_.add(microseconds); }
-  /// Counts what was wrong with a message of a channel, or with the process (empty channel).
+  /// Counts a fault of a message on a channel, or of the process (empty channel).
   void count_reason(std::string_view channel, wire::Reason reason, std::string_view text);
-  /// A condition holds, or not (any more); see ReasonCounts. True where that is new.
+  /// Sets whether a condition holds; see ReasonCounts. True where this is a change.
   bool set_condition(std::string_view channel, wire::Reason reason, bool holds,
                      std::string_view text) {
     return holds ? reasons_.hold(channel, reason, text) : reasons_.release(channel, reason);
@@ -56,20 +56,20 @@ class HealthMonitor {
   void set_sequence(std::size_t channel, const SequenceCounts& counts);
   /// Sets how many messages the bus dropped; an increase degrades the state.
   void set_dropped(std::size_t channel, std::uint64_t dropped);
-  /// Sets what came from the network and was no message; an increase degrades the state.
+  /// Sets the counts of refused datagrams; an increase degrades the state.
   void set_refused(const DatagramFaults& faults) { reasons_.set_refused(faults); }
 
   /// From now on the state follows from the reasons; before it is STARTING.
   void ready() { is_ready_ = true; }
   /// From now on the state is STOPPING.
   void stop() { is_stopping_ = true; }
-  /// The state as health_t has it: STARTING, OK, DEGRADED, ERROR or STOPPING.
+  /// The state in the terms of health_t: STARTING, OK, DEGRADED, ERROR or STOPPING.
   std::int8_t state() const;
 
   /// The message for HEALTH. Rates are over the time since the last call, latencies since the call
-  /// before that. The caller adds what it alone has: buffers, journal, snapshot.
+  /// before that. The caller adds buffers, journal and snapshot.
   health_t report(std::int64_t message_utime);
-  /// How often this reason came for this channel.
+  /// Count of this reason on this channel.
   std::int64_t count_of(std::string_view channel, wire::Reason reason) const {
     return reasons_.count_of(channel, reason);
   }

@@ -17,8 +17,8 @@ namespace {
 constexpr std::array<std::string_view, 7> kProcessKeys{
     "name", "executable", "config", "arguments", "is_service", "keeps_state", "ends_last"};
 
-/// A name is also that of the folder of the process's state, which `--fresh` deletes: it must not
-/// lead elsewhere.
+/// The name is also the name of the process's state folder, which `--fresh` deletes: it must not
+/// lead to another folder.
 bool is_plain_name(std::string_view name) {
   return name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
            const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
@@ -28,7 +28,7 @@ bool is_plain_name(std::string_view name) {
 
 class LaunchReader {
  public:
-  /// `before`: the files whose bases led here.
+  /// `before`: the chain of files whose bases led here.
   explicit LaunchReader(std::filesystem::path file, std::vector<std::filesystem::path> before = {})
       : file_(std::move(file)), before_(std::move(before)) {}
 
@@ -67,7 +67,7 @@ class LaunchReader {
         {fmt::format("{}:{}: {}", file_.string(), node.source().begin.line, what)});
   }
 
-  /// The processes of the base, with the files that this folder puts in place of theirs.
+  /// The processes of the base, with the files of this folder in place of theirs.
   LaunchConfig inherited(const toml::table& root) const {
     const auto folder = base_of(root, file_.string());
     if (!folder) return {};

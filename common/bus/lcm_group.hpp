@@ -1,4 +1,4 @@
-// liblcm on one group.
+// liblcm on one multicast group.
 #pragma once
 
 #include <lcm/lcm.h>
@@ -13,7 +13,7 @@
 
 namespace understory::bus {
 
-/// Everything that is sent into a group. For udpm:// our own receiver hears it, for others liblcm.
+/// Sends into one group. Our own receiver receives udpm:// groups; liblcm receives others.
 class LcmGroup {
  public:
   /// Throws BusError where the URL or its route is wrong.
@@ -22,17 +22,17 @@ class LcmGroup {
   LcmGroup(const LcmGroup&) = delete;
   LcmGroup& operator=(const LcmGroup&) = delete;
 
-  /// Sends a message. Precondition: check_publishable() has no objection.
+  /// Sends a message. Precondition: check_publishable() returns none.
   std::optional<wire::Refusal> publish(std::string_view channel,
                                        std::span<const std::uint8_t> bytes);
   /// As given to the constructor.
   const std::string& url() const { return url_; }
-  /// The parts of a udpm:// URL; none = liblcm receives.
+  /// The parts of a udpm:// URL; none for another URL (liblcm receives).
   const std::optional<UdpmUrl>& udpm() const { return udpm_; }
-  /// For what only liblcm can do.
+  /// Access to liblcm.
   lcm_t* lcm() const { return lcm_; }
 
-  bool is_joined = false;  ///< Our receiver hears it.
+  bool is_joined = false;  ///< Our receiver has joined the group.
 
  private:
   std::string url_;

@@ -17,7 +17,7 @@
 namespace understory::bus {
 namespace {
 
-/// liblcm reads a channel as a regular expression; a name shall be only itself.
+/// liblcm reads a channel as a regular expression; a name must match only itself.
 std::string escaped(std::string_view channel) {
   std::string result;
   for (const char c : channel) {
@@ -27,11 +27,11 @@ std::string escaped(std::string_view channel) {
   return result;
 }
 
-/// What liblcm may hold for one channel while a handler runs, beyond our own queue; when that is
-/// full too, the loss shows as a gap in the sequence.
+/// Messages that liblcm may store for one channel while a handler runs, beyond our own queue; if
+/// that is full too, the loss appears as a gap in the sequence.
 int liblcm_capacity(std::size_t queue_size) { return static_cast<int>(4 * queue_size + 64); }
 
-/// One handle_one() takes in at most this many, so that a flood cannot keep it from its handlers.
+/// One handle_one() receives at most this many messages, so that a flood cannot block the handlers.
 constexpr int kMostTakenAtOnce = 1024;
 
 }  // namespace
@@ -116,7 +116,7 @@ class LiveBus::Impl {
   }
 
   int file_descriptor() const {
-    // With udpm:// this call of liblcm's would open its own receiving socket.
+    // With udpm:// this call of liblcm would open a receiving socket of its own.
     return main_.udpm() ? queue_.file_descriptor() : lcm_get_fileno(main_.lcm());
   }
 
@@ -134,7 +134,7 @@ class LiveBus::Impl {
     return *bulk_;
   }
 
-  /// A process that only sends is not sent everything that others send.
+  /// A process that only sends does not join, so it does not receive all traffic.
   void join(LcmGroup& group) {
     if (group.is_joined) return;
     if (!receiver_) {
@@ -148,7 +148,7 @@ class LiveBus::Impl {
     if (&group == &main_) buffer_.granted_bytes = granted_bytes;
   }
 
-  /// Only copies: handlers run later, outside liblcm's frames, where they may throw.
+  /// Only copies the message: handlers run later, outside liblcm's frames, so that they may throw.
   static void take_in(const lcm_recv_buf_t* buffer, const char* channel, void* self) noexcept {
     static_cast<Impl*>(self)->queue_.push(
         channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size},
@@ -161,8 +161,8 @@ class LiveBus::Impl {
   Pacer pacer_;
   ReceiveBuffer buffer_;
   ArrivalQueue queue_;
-  std::unique_ptr<UdpmReceiver> receiver_;       // behind the queue that it fills
-  std::set<std::string, std::less<>> channels_;  // that liblcm was asked for
+  std::unique_ptr<UdpmReceiver> receiver_;       // declared after the queue that it fills
+  std::set<std::string, std::less<>> channels_;  // subscribed with liblcm
 };
 
 LiveBus::LiveBus(const std::string& url, Groups groups, double bulk_bytes_per_s)

@@ -9,21 +9,21 @@ namespace understory::bus {
 /// A bus whose messages wait in queues of this process until handle_one() or drain().
 class MemoryBus : public Bus {
  public:
-  /// Whether subscriptions' queues are as long as they ask for, or lose nothing.
+  /// Whether queues are bounded as subscribed, or unbounded.
   enum class Queues : std::uint8_t { kBounded, kUnlimited };
 
-  /// `tap` sees every message as it is published, before anybody handles it.
+  /// `tap` is called with every published message before its handlers.
   explicit MemoryBus(Queues queues = Queues::kBounded, Handler tap = {})
       : queues_(queues), tap_(std::move(tap)) {}
 
   std::optional<wire::Refusal> publish(std::string_view channel,
                                        std::span<const std::uint8_t> bytes) override;
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override;
-  /// Never waits: what will come can only come from this process.
+  /// Never waits: all messages come from this process.
   bool handle_one(int timeout_ms) override;
   std::uint64_t dropped(std::string_view channel) const override;
 
-  /// Hands out until nothing waits.
+  /// Handles messages until none waits.
   void drain();
 
  private:

@@ -6,10 +6,10 @@
 namespace understory::bus {
 namespace {
 
-/// A channel's stamp may be this many of its intervals ahead; so may a stamp that agrees be of the
-/// pause that it speaks for.
+/// A channel's stamp may be ahead by this many of its intervals; a stamp that agrees, by this many
+/// times the pause.
 constexpr std::int64_t kIntervals = 3;
-/// A day [us]: a pause beyond it says nothing about the pace.
+/// A day [us]: a longer pause is no evidence of the channel's interval.
 constexpr std::int64_t kLongestInterval_us = 86'400'000'000;
 
 }  // namespace
@@ -18,13 +18,13 @@ MessageClock::Verdict MessageClock::take(std::int64_t utime, const ChannelPace& 
   const std::int64_t paced_us = kIntervals * std::min(pace.interval_us, kLongestInterval_us);
   const bool is_near = utime <= now_ ? now_ - utime <= largest_jump_us_
                                      : utime - now_ <= std::max(largest_jump_us_, paced_us);
-  // A slow channel that goes on at its pace proves those that have waited where it is now.
+  // A slow channel that continues at its interval proves the waiting stamps near its new stamp.
   if (now_ >= 0 && is_near && utime - now_ > largest_jump_us_ && agrees(utime)) {
     resume(utime);
     return Verdict::kJumped;
   }
   if (now_ < 0 || is_near) {
-    // Time goes on from where it was: what waited was wrong.
+    // Time continues from now_: the waiting stamps were wrong.
     if (utime > now_) agreeing_ = 0;
     behind_ = 0;
     now_ = std::max(now_, utime);
@@ -50,7 +50,8 @@ MessageClock::Verdict MessageClock::take_far(std::int64_t utime) {
   return Verdict::kJumped;
 }
 
-/// Whether time goes on from the candidate: near it or, after a pause, as much later again.
+/// Whether the stamp continues from the candidate: near it or, after a pause, up to kIntervals
+/// pauses later.
 bool MessageClock::agrees(std::int64_t utime) const {
   if (agreeing_ == 0) return false;
   const std::int64_t pause_us = std::min(candidate_ - now_, kLongestInterval_us);

@@ -1,4 +1,4 @@
-// The time of a service: the newest stamp of what it takes in.
+// The time of a service: the newest stamp of its inputs.
 #pragma once
 
 #include <cstdint>
@@ -8,35 +8,35 @@ namespace understory::bus {
 
 /// The stamps of one channel so far, as evidence for its next one [us].
 struct ChannelPace {
-  /// Of a stamp whose channel nobody knows: nothing speaks for it.
+  /// Value for a stamp of an unknown channel: there is no evidence for it.
   static constexpr std::int64_t kUnknown = std::numeric_limits<std::int64_t>::max();
 
   std::int64_t newest_us = kUnknown;  ///< Newest believed stamp; -1 = this is the first.
-  std::int64_t interval_us = 0;       ///< Between the last two.
+  std::int64_t interval_us = 0;       ///< Interval between the last two believed stamps.
 
-  /// The next believed stamp.
+  /// Takes the next believed stamp.
   void take(std::int64_t utime) {
     interval_us = newest_us < 0 || utime < newest_us ? 0 : utime - newest_us;
     newest_us = utime;
   }
 };
 
-/// Follows the newest stamp. A stamp far from it is not believed until several in a row agree: one
-/// wrong stamp must neither stop the service nor make everything after it look old.
+/// Follows the newest stamp. A stamp far from it is not believed until several in succession agree:
+/// one wrong stamp must neither stop the service nor make later messages look old.
 ///
-/// How long a pause may be has no limit: a vehicle may stop for hours, and a slow one gives a
-/// keyframe a minute. What lies behind (a keyframe has the stamp of its first scan) is believed
-/// where it is in order on its own channel, and what lies ahead where its channel is that slow or
-/// time goes on from there.
+/// A pause may have any length: a vehicle may stop for hours, and a slow one makes one keyframe per
+/// minute. An earlier stamp (a keyframe has the stamp of its first scan) is believed if it is in
+/// order on its own channel. A later stamp is believed if its channel is that slow or if further
+/// stamps continue from it.
 class MessageClock {
  public:
-  /// What take() did with a stamp.
+  /// The decision of take() on a stamp.
   enum class Verdict : std::uint8_t {
     kFine,         ///< Believed.
-    kQuarantined,  ///< Waits for proof; the ones that waited before it were wrong.
-    kAgrees,       ///< Waits, too, and speaks for those that wait.
-    kJumped,  ///< Three in a row agreed, or one at its channel's pace: all are believed, and now()
-              ///< is this one.
+    kQuarantined,  ///< Waits for proof; the messages that waited before were wrong.
+    kAgrees,       ///< Waits too, and agrees with the waiting ones.
+    kJumped,  ///< Three in succession agreed, or one at its channel's interval: all are believed,
+              ///< and now() is this stamp.
   };
 
   /// `largest_jump_us`: a stamp farther than this from now() needs proof.
@@ -53,7 +53,8 @@ class MessageClock {
 
  private:
   static constexpr int kAgreeing = 3;
-  /// Messages in a row, each in order on its channel, far behind now(): then that is wrong.
+  /// If this many messages in succession, each in order on its channel, are far behind now(), then
+  /// now() is wrong.
   static constexpr int kBehind = 32;
 
   bool agrees(std::int64_t utime) const;

@@ -7,24 +7,24 @@
 
 namespace understory::bus {
 
-/// Calls handlers at their periods. Time comes from the stamps of messages, so a replay ticks as
-/// the live run did.
+/// Calls handlers periodically. Time comes from the stamps of messages, so a replay makes the same
+/// ticks as the live run.
 class MessageTimers {
  public:
   /// Called with the time that is due [us].
   using Handler = std::function<void(std::int64_t due_us)>;
 
-  /// Adds a timer. Its first tick is one period behind the first fire(). Throws std::logic_error
-  /// for a period that is not positive.
+  /// Adds a timer. Its first tick is one period after the first fire(). Throws std::logic_error for
+  /// a period that is not positive.
   void add(std::int64_t period_us, Handler handler);
-  /// Calls everything that is due up to `now_us`, timer by timer, each tick of a period once.
+  /// Calls all ticks due up to `now_us`, timer by timer, each tick once.
   void fire(std::int64_t now_us);
-  /// The periods begin anew at the next fire(): time has jumped.
+  /// Restarts all periods at the next fire(), after a jump of time.
   void start_over();
 
-  /// When each timer is due [us], for a restart; -1 = it has not begun.
+  /// Next due time of each timer [us], for a restart; -1 = not started.
   std::vector<std::int64_t> due_us() const;
-  /// Takes what due_us() gave. Precondition: as many timers as then.
+  /// Restores the result of due_us(). Precondition: the same number of timers.
   void resume(const std::vector<std::int64_t>& due_us);
 
  private:

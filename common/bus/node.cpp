@@ -6,7 +6,7 @@
 namespace understory::bus {
 namespace {
 
-constexpr int kRefusedWindow = 32;  ///< Messages.
+constexpr int kRefusedWindow = 32;  ///< Refused ones are counted among this many messages.
 constexpr std::int64_t kSilent_us = 2'000'000;
 
 }  // namespace
@@ -132,7 +132,7 @@ bool Node::admit_time(Input& input, const BusMessage& message, model::Utime utim
   }
   if (verdict == Verdict::kFine) return true;
   if (source_ != Source::kBus) {
-    // What is proven and what is in the journal had been believed: time jumps with it.
+    // Proven and journaled messages were believed before: time jumps with them.
     start_at_jump(utime);
     return true;
   }
@@ -140,7 +140,7 @@ bool Node::admit_time(Input& input, const BusMessage& message, model::Utime utim
   return false;
 }
 
-/// The messages that waited, and the one that proved them, as they will come from the journal.
+/// Handles the waiting messages and the one that proved them, in the order of the journal.
 void Node::feed_proven() {
   const std::vector<HeldMessage> proven = time_.jumped();
   log(Level::kWarning, to_string(wire::Reason::kClockJump),
@@ -160,7 +160,7 @@ void Node::count_wrong(std::string_view channel) {
 void Node::start_at_jump(model::Utime utime) {
   time_.jumped();  // None waits any more.
   time_.resume(utime);
-  // Sequence numbers from before the jump do not bind what comes now.
+  // Sequence numbers from before the jump do not apply to later messages.
   for (const auto& one : inputs_) one->sequence.resume(-1, -1);
   timers_.start_over();
 }
@@ -169,7 +169,7 @@ void Node::send(Output& output, model::Utime utime, const wire::Bytes& bytes,
                 const wire::WireType& type) {
   if (is_recovering()) return;
 
-  // The same checks as for inputs: nothing that is not finite is ever published.
+  // The same checks as for inputs: values that are not finite are never published.
   std::optional<wire::Refusal> refusal = check_bytes(bytes, type);
   if (refusal) refusal = wire::Refusal{wire::Reason::kNotSent, refusal->detail};
   if (!refusal) refusal = bus_.publish(output.channel, bytes);

@@ -1,6 +1,6 @@
 // A service's place on the bus: typed messages in and out, ticks, state, health.
 //
-// What an adapter calls when it is bound:
+// Calls of an adapter in bind():
 //   node.subscribe<LandmarkScan>("LANDMARKS", [this](const LandmarkScan& scan) { ... });
 //   keyframes_ = node.advertise<Keyframe>("KEYFRAME");
 //   node.every(1'000'000, [this](Utime now) { ... });
@@ -35,30 +35,30 @@ namespace understory::bus {
 
 class Node;
 
-/// Whether an input may be silent. By the computer's clock and for HEALTH only: where nothing comes
-/// at all, message time stands still.
+/// Whether an input may be silent. Judged by the computer's clock, for HEALTH only: without any
+/// input, message time does not advance.
 enum class Cadence : std::uint8_t {
-  kAny,       ///< It may.
-  kSteady,    ///< Not after its first message.
-  kExpected,  ///< Not at all.
+  kAny,       ///< It may be silent.
+  kSteady,    ///< Not silent after its first message.
+  kExpected,  ///< Never silent.
 };
 
-/// How an input is taken.
+/// Options of an input.
 struct SubscribeOptions {
   std::size_t queue_size = 30;  ///< Messages that may wait; when full, the oldest is dropped.
-  /// One sender numbers its messages: duplicates and late comers are dropped. False for requests,
-  /// which anybody may send.
+  /// One sender numbers its messages: duplicates and late messages are dropped. False for requests,
+  /// which several processes may send.
   bool sequenced = true;
-  /// Late comers are handed on, too: the service puts them in order. Duplicates are dropped.
+  /// Late messages reach the handler too: the service sorts them. Duplicates are dropped.
   bool takes_late = false;
-  /// Its stamps move the service's time, and one far from it is refused. False for what comes back
-  /// from those who take the service's output: its stamps are on the service's time, which is not
-  /// that of sensors whose clocks have jumped.
+  /// Its stamps advance the service's time, and a stamp far from it is refused. False for inputs
+  /// from consumers of the service's output: their stamps follow the service's time, not a sensor
+  /// clock that has jumped.
   bool timed = true;
-  /// A larger message is refused before anything looks at it (`too_large`): what a message may cost
-  /// follows from its size.
+  /// A larger message is refused before decoding (`too_large`): the size bounds the cost of a
+  /// message.
   std::size_t most_bytes = kLargestMessage;
-  bool journaled = true;            ///< Part of the state: fed again after a restart.
+  bool journaled = true;            ///< Written to the journal: handled again after a restart.
   Cadence cadence = Cadence::kAny;  ///< HEALTH is not OK while it is silent for 2 s.
 };
 
@@ -66,11 +66,11 @@ struct SubscribeOptions {
 template <class T>
 class Publisher {
  public:
-  /// Without a channel: publish() must not be called.
+  /// Without a channel; publish() must not be called.
   Publisher() = default;
-  /// Sends a value. One that is not finite, or that the bus refuses, is counted and not sent.
-  /// Returns the bytes of the message, whether it was sent or not: a state that is recovered counts
-  /// as the first run did.
+  /// Sends a value. A value that is not finite, or that the bus refuses, is counted and not sent.
+  /// Returns the size of the message [bytes] also where it was not sent, so that a recovery counts
+  /// the same.
   std::size_t publish(const T& value) const;
 
  private:
@@ -80,26 +80,26 @@ class Publisher {
   std::size_t output_ = 0;
 };
 
-/// How a node names its channels, believes stamps and keeps its state.
+/// Options of a node: names of channels, clock, saved state.
 struct NodeOptions {
   std::string process;                            ///< As in HEALTH.
   std::string version;                            ///< As in HEALTH and CONFIG.
-  std::string channel_suffix;                     ///< Of every output, e.g. _ALT.
+  std::string channel_suffix;                     ///< Suffix of every output, e.g. _ALT.
   std::vector<std::string> suffixed_inputs;       ///< Inputs that carry the suffix too.
-  std::int64_t largest_clock_jump_us = 10000000;  ///< MessageClock's.
+  std::int64_t largest_clock_jump_us = 10000000;  ///< Limit of MessageClock.
   model::Utime snapshot_every_us = 30000000;      ///< Message time between two snapshots.
   int snapshot_every_events = 1000;               ///< Inputs between two snapshots.
-  /// Refused messages of the latest 32 of an input with which it is `input_refused`.
+  /// An input is `input_refused` if this many of its latest 32 messages were refused.
   int refused_of_last_32 = 16;
   bool publishes_health = true;  ///< HEALTH; LOG and CONFIG are always published.
 };
 
-/// A facade, hence the number of functions: adapters see channels, ticks and messages for people;
-/// drivers see state, health and the feed. What it does is owned by its members; it decides which
+/// A facade, hence the number of functions: adapters use channels, ticks and messages for people;
+/// drivers use state, health and feed(). Its members own the state; the node itself decides which
 /// messages reach the stage.
 class Node {
  public:
-  using Level = LogLevel;  ///< How urgent a line of LOG is.
+  using Level = LogLevel;  ///< Severity of a line of LOG.
 
   /// `bus` must outlive it. `clock` is for HEALTH only.
   Node(Bus& bus, NodeOptions options, Clock clock);
@@ -108,30 +108,31 @@ class Node {
 
   // For adapters.
 
-  /// `handler` takes a T: a value of common/model or a wire type. It may throw: counted, reported,
-  /// the message is done with. Throws std::logic_error for a channel that is subscribed already.
+  /// `handler` takes a T: a value of common/model or a wire type. If it throws, this is counted and
+  /// reported, and the message is not handled again. Throws std::logic_error for a channel that is
+  /// subscribed already.
   template <class T, class F>
   void subscribe(const std::string& channel, F handler, SubscribeOptions options = {});
   /// An output for values T of common/model or a wire type. Throws std::logic_error for a name that
   /// no channel can have.
   template <class T>
   Publisher<T> advertise(const std::string& channel);
-  /// Called with the time that is due, in message time: before the message that moves time past it.
+  /// Calls `handler` with the due message time, before the message that advances time past it.
   void every(model::Utime period_us, std::function<void(model::Utime)> handler) {
     timers_.add(period_us, std::move(handler));
   }
   /// Newest stamp among the inputs; -1 before the first.
   model::Utime now() const { return time_.now(); }
-  /// Something a person should read: LOG.
+  /// Publishes a line of LOG.
   void log(Level level, std::string_view code, std::string_view text,
            std::string_view channel = "") {
     announcer_.log(now(), level, code, text, channel);
   }
-  /// Something is wrong: counted for HEALTH, and LOG at a limited rate.
+  /// Reports a fault: counted for HEALTH, and in LOG at a limited rate.
   void report(wire::Reason reason, std::string_view text, std::string_view channel = "");
 
-  /// HEALTH is not OK as long as the condition holds; its beginning and its end are in LOG. To be
-  /// called after each event, and after the state was loaded.
+  /// HEALTH is not OK as long as the condition holds; its beginning and its end are in LOG. Call it
+  /// after each event, and after loading the state.
   void show(const WatchedCondition& watched);
 
   // For the drivers.
@@ -139,16 +140,16 @@ class Node {
   /// `save`, `load` and `state_was_lost` of the stage; see Adapter.
   void keep_state(std::function<std::string()> save, std::function<void(const std::string&)> load,
                   std::function<void(std::int64_t)> lost);
-  /// Loads the snapshot and feeds the journal, publishing nothing. False: the state could not be
-  /// loaded; the stage may be half loaded and must be made anew.
+  /// Loads the snapshot and handles the journal's messages without publishing. False: the state
+  /// could not be loaded; the stage may be partly loaded and must be created again.
   bool recover(StateStore& store);
-  /// Where no snapshot is left of a state that was there, the stage is told.
+  /// Calls `state_was_lost` if the snapshot of an earlier state was lost.
   void tell_of_loss(const StateStore& store);
   /// From now on inputs are written to the store before they are handled.
   void journal_to(StateStore* store) { state_.journal_to(store); }
   /// Saves the state, where there is a store. A failure is reported.
   void save_snapshot();
-  /// Subscribes on the bus: from now on messages come.
+  /// Subscribes on the bus: messages arrive from now on.
   void connect();
   /// Handles one message as if it came from the bus; false = no input has this channel.
   bool feed(const BusMessage& message);
@@ -157,7 +158,7 @@ class Node {
   bool takes(std::string_view channel) const;
   /// Names of the outputs, suffix included; HEALTH, LOG and CONFIG are not among them.
   std::vector<std::string> outputs() const;
-  /// Every input and output as the adapter names it, without suffix.
+  /// Every input and output without suffix.
   std::vector<BoundChannel> channels() const;
   /// The message for HEALTH, as of now.
   health_t health();
@@ -177,29 +178,29 @@ class Node {
   std::size_t publish_wire(std::size_t output, Wire message);
 
  private:
-  /// Takes the message's header to `admit`; calls the handler where that agrees.
+  /// Reads the message's header, calls `admit`, and calls the handler where it returns true.
   using Admit = std::function<bool()>;
   using Take =
       std::function<std::optional<wire::Refusal>(std::span<const std::uint8_t>, const Admit&)>;
   struct Input {
-    std::string name;     ///< As the adapter calls it.
+    std::string name;     ///< Without suffix.
     std::string channel;  ///< With the suffix, where it carries one.
     SubscribeOptions options;
     Take take;
     SequenceTracker sequence;
     ChannelPace pace{-1, 0};
-    WatchedCondition refused;              ///< Of its latest messages; of this process.
-    bool is_late = false;                  ///< The message that is being handled.
-    std::optional<std::int64_t> heard_us;  ///< The latest one, on the computer's clock.
+    WatchedCondition refused;              ///< Refused messages of this process.
+    bool is_late = false;                  ///< Whether the present message is late.
+    std::optional<std::int64_t> heard_us;  ///< Time of the latest message, computer's clock.
     std::size_t health = 0;
   };
   struct Output {
-    std::string name;     ///< As the adapter calls it.
+    std::string name;     ///< Without suffix.
     std::string channel;  ///< With the suffix.
     std::int64_t next_sequence = 0;
     std::size_t health = 0;
   };
-  /// Where a message that is fed comes from.
+  /// Origin of a message that is handled.
   enum class Source : std::uint8_t { kBus, kProven, kJournal };
   struct Stage {
     std::function<std::string()> save;

@@ -1,4 +1,4 @@
-// State over restarts: the node's own part (time, sequence numbers) and the stage's.
+// State over restarts: the node's part (time, sequence numbers) and the stage's part.
 #include "common/bus/node_state.hpp"
 
 #include <stdexcept>
@@ -61,7 +61,7 @@ void Node::load_state(const std::string& bytes) {
 }
 
 bool Node::recover(StateStore& store) {
-  // Load the snapshot and repeat what came after it.
+  // Load the snapshot and repeat the later inputs.
   StateStore::Recovered recovered = store.open();
   bool is_loaded = true;
   source_ = Source::kJournal;
@@ -81,7 +81,7 @@ bool Node::recover(StateStore& store) {
   announcer_.mute(false);
   store.end_recovery();
 
-  // Report what was lost and what was found.
+  // Report lost and loaded parts.
   if (store.needs_snapshot()) state_.start_failed();
   for (const wire::Refusal& problem : recovered.problems) {
     problem.reason == wire::Reason::kStateNotKept ? show_kept(problem)
@@ -100,14 +100,14 @@ void Node::save_snapshot() {
   show_kept(state_.save(now(), [this] { return save_state(); }));
 }
 
-/// A state that is not kept is a condition of the process until a snapshot is saved.
+/// A failure to save is a condition of the process until a snapshot is saved.
 void Node::show_kept(const std::optional<wire::Refusal>& refusal) {
   constexpr wire::Reason kReason = wire::Reason::kStateNotKept;
   const bool holds = state_.is_failing();
   const bool has_changed = monitor_.set_condition(
       "", kReason, holds, refusal ? refusal->detail : "the state directory cannot be written");
 
-  // A condition that begins is counted as it is set.
+  // The begin of a condition is counted by set_condition().
   if (refusal && holds && has_changed) {
     announcer_.report(now(), kReason, refusal->detail, {});
   } else if (refusal) {

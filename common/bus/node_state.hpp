@@ -1,4 +1,4 @@
-// What a node keeps over a restart.
+// The saved state of a node.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 
 namespace understory::bus {
 
-/// The node's own part of a service's state, and the stage's as it gave it. Counts for HEALTH are
-/// not part of it: they are of one process.
+/// The node's own part of a service's state, and the stage's saved bytes. Counts for HEALTH are not
+/// part of it: they belong to one process.
 struct NodeState {
-  /// The list of members that follows.
+  /// Version of the list of members.
   static constexpr state::Format kFormat{"node", 3};
 
   std::int64_t now_us = -1;  ///< TimeGate::now().
@@ -26,7 +26,7 @@ struct NodeState {
   std::vector<std::int64_t> timers_due_us;      ///< MessageTimers::due_us().
   std::string stage;                            ///< Adapter::save().
 
-  /// Lists the members, see common/state.
+  /// Serialises the members, see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.now_us, self.inputs, self.paces, self.outputs, self.timers_due_us, self.stage);

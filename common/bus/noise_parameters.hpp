@@ -1,4 +1,4 @@
-// The parameters of learned noise, for each service that takes LANDMARKS.
+// The parameters of learned noise, for each service that subscribes LANDMARKS.
 #pragma once
 
 #include "common/bus/parameter_table.hpp"

@@ -6,9 +6,9 @@
 
 namespace understory::bus {
 
-/// The IPv4 addresses of this computer's interfaces. A kernel takes no packet with one of them as
-/// its source from a network, so the source tells. Interfaces come and go: an address that is not
-/// known is looked up again, at most once a second.
+/// The IPv4 addresses of this computer's interfaces. The kernel drops packets from a network that
+/// have one of them as source, so the source address is reliable. Interfaces can change: for an
+/// unknown address the list is read again, at most once a second.
 class OwnAddresses {
  public:
   /// `address` in host byte order; `now_us` on any steady clock.

@@ -1,4 +1,4 @@
-// Loading and checking: everything that can be wrong is found before anything is set.
+// Loading and checking: all faults are found before any value is set.
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
@@ -60,18 +60,19 @@ std::string shown(const toml::node& node) {
   return text.str();
 }
 
-/// The number as a double; none for a whole number that no double is equal to. (toml++ itself gives
-/// none for every whole number above 2^53, exact or not.)
+/// The number as a double; none for a whole number without an equal double. (toml++ itself returns
+/// none for every whole number above 2^53.)
 std::optional<double> exact_double(const toml::node& number) {
   if (const auto* real = number.as_floating_point()) return real->get();
   const std::int64_t whole = number.as_integer()->get();
   const auto nearest = static_cast<double>(whole);
-  // 2^63 is a double, but no int64: what rounds up to it is not exact, and must not be cast back.
+  // 2^63 is a double, but no int64: a number that rounds up to it is not exact and must not be cast
+  // back.
   const bool is_exact = nearest < 0x1p63 && static_cast<std::int64_t>(nearest) == whole;
   return is_exact ? std::optional(nearest) : std::nullopt;
 }
 
-/// A value that passed every check; set when the whole file has.
+/// A value that passed every check; set after the whole file has passed.
 struct Setting {
   const ParameterTable::Entry* entry = nullptr;
   std::variant<double, int, bool, std::string> value;
@@ -83,7 +84,7 @@ class Loader {
          const std::vector<ParameterTable::OldKey>& old_keys)
       : entries_(entries), old_keys_(old_keys) {}
 
-  /// Takes a file; what an earlier one stated of the same keys is replaced.
+  /// Takes a file; it replaces values of the same keys in earlier files.
   void take(const ConfigLayer& layer) {
     name_ = layer.name;
     walk(layer.table, "");
@@ -125,8 +126,8 @@ class Loader {
                        [&](const auto& old) { return is_inside(old.name); });
   }
 
-  /// What became of a key of an older version; empty where it was never one. The longest rule
-  /// holds: a key that was renamed within a renamed table has a rule of its own.
+  /// The message for a key of an older version; empty where the key is none. The longest matching
+  /// rule applies: a key renamed within a renamed table has its own rule.
   std::string what_became_of(const std::string& path) const {
     const ParameterTable::OldKey* best = nullptr;
     for (const ParameterTable::OldKey& rule : old_keys_) {

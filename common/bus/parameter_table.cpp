@@ -23,7 +23,7 @@ std::string joined(const std::vector<std::string>& lines) {
   return text;
 }
 
-/// A floating point number that TOML reads as one.
+/// The number in a form that TOML reads as floating point.
 std::string number_as_toml(double value) {
   std::string text = fmt::format("{}", value);
   if (text.find_first_of(".en") == std::string::npos) text += ".0";
@@ -136,7 +136,7 @@ void ParameterTable::add(std::string key, std::string& value, std::vector<std::s
 }
 
 std::string ParameterTable::to_toml() const {
-  // Keys without a table come first: behind a table's head they would belong to it.
+  // Keys without a table come first: after a table's header they would belong to that table.
   std::vector<std::pair<std::string, std::string>> tables{{"", ""}};
   for (const Entry& entry : entries_) {
     const std::size_t dot = entry.key.rfind('.');

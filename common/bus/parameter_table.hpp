@@ -1,5 +1,4 @@
-// Parameters described once: loading, checking, --help and the printed configuration file all come
-// from the same list.
+// One list of parameters for loading, checking, --help and the printed configuration file.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +10,7 @@
 
 namespace understory::bus {
 
-/// What is wrong with a configuration, one line each: file:line: key: what, and what is allowed.
+/// The faults of a configuration, one per line: file:line: key: fault, and the allowed values.
 class ConfigurationError : public std::runtime_error {
  public:
   /// what() is all problems, one per line.
@@ -30,7 +29,7 @@ struct Range {
   T highest;
 };
 
-/// A list of parameters, each bound to a variable that holds its default when it is added. Keys are
+/// A list of parameters, each bound to a variable that has the default value when added. Keys are
 /// dotted paths of TOML tables, e.g. joint.gate_sigmas.
 class ParameterTable {
  public:
@@ -46,7 +45,7 @@ class ParameterTable {
     int fallback;
     Range<int> range;
   };
-  /// A yes-or-no parameter with its default.
+  /// A Boolean parameter with its default.
   struct Boolean {
     bool* value;
     bool fallback;
@@ -57,7 +56,7 @@ class ParameterTable {
     std::string fallback;
     std::vector<std::string> choices;  ///< Empty = anything.
   };
-  /// One parameter: its key, its unit ("" = none), one sentence on it, and the variable behind it.
+  /// One parameter: its key, its unit ("" = none), one sentence of description, and its variable.
   struct Entry {
     std::string key;
     std::string unit;
@@ -65,28 +64,28 @@ class ParameterTable {
     std::variant<Number, Integer, Boolean, Text> target;
   };
 
-  /// A key of an older version: what it is called now, or why there is none any more.
+  /// A key of an older version: its new name, or the reason of its removal.
   struct OldKey {
     std::string name;      ///< Ends in "." where it is all keys of a TOML table.
     std::string new_name;  ///< Empty where the key was removed.
     std::string why_removed;
   };
 
-  /// Adds a real parameter; `value` holds the default and must outlive the table. Throws
-  /// std::logic_error for a key that is there already.
+  /// Adds a real parameter; `value` has the default and must outlive the table. Throws
+  /// std::logic_error for a repeated key.
   void add(std::string key, double& value, Range<double> range, std::string unit, std::string doc);
   /// Adds a whole-number parameter.
   void add(std::string key, int& value, Range<int> range, std::string unit, std::string doc);
-  /// Adds a yes-or-no parameter.
+  /// Adds a Boolean parameter.
   void add(std::string key, bool& value, std::string doc);
   /// Adds a text parameter; `choices` empty = any text.
   void add(std::string key, std::string& value, std::vector<std::string> choices, std::string doc);
 
-  /// A key of an older version, which is refused with the new one in the message. Both may end in
-  /// "." and then mean all keys of a TOML table.
+  /// A renamed key: it is refused with the new key in the message. Both may end in "." and then
+  /// mean all keys of a TOML table.
   void renamed(std::string old_key, std::string new_key);
-  /// A key of an older version, or with "." at its end all keys of a TOML table, that is refused
-  /// with this reason: what does its work now.
+  /// A removed key (or all keys of a TOML table if it ends in "."): it is refused with this reason,
+  /// which names the replacement.
   void removed(std::string old_key, std::string why);
 
   /// All parameters in the order of adding.
@@ -94,11 +93,10 @@ class ParameterTable {
   /// All rules added by renamed() and removed().
   const std::vector<OldKey>& old_keys() const { return old_keys_; }
 
-  /// Sets what the file states, on top of what the file states that its key `base` names; the rest
-  /// keeps its default. Throws ConfigurationError with all that is wrong; then nothing has been
-  /// set.
+  /// Sets the values of the file, over those of its base file (key `base`); other parameters keep
+  /// their defaults. Throws ConfigurationError with all faults; then no value has been set.
   void load(const std::filesystem::path& file);
-  /// The same from text; `name` is the file's name in messages, and a `base` is relative to it.
+  /// The same from text; `name` is the file's name in messages; a `base` is relative to it.
   void load_text(std::string_view toml, const std::string& name);
 
   /// A configuration file with the values in force, each with its unit, range and meaning.

@@ -6,7 +6,7 @@
 namespace understory::bus {
 namespace {
 
-/// A node of the map, its vector and what the allocator adds to both, rounded up.
+/// Bytes of a map node, its vector and the allocator's overhead for both, rounded up.
 constexpr std::size_t kPartOverhead = 128;
 
 }  // namespace
@@ -36,7 +36,7 @@ std::optional<DatagramFault> PartialMessage::check(const Fragment& fragment) con
   return std::nullopt;
 }
 
-/// True where the bytes of the fragment are there already, at its place.
+/// True where the same bytes were received before at the same offset.
 bool PartialMessage::is_identical(const Fragment& fragment) const {
   if (fragment.number == 0 && fragment.channel != channel_) return false;
   if (fragment.payload.empty()) return true;
@@ -45,7 +45,7 @@ bool PartialMessage::is_identical(const Fragment& fragment) const {
 }
 
 void PartialMessage::add(const Fragment& fragment, std::int64_t now_us) {
-  // The allocation first: when it fails, nothing has changed.
+  // Allocate first: if this fails, nothing has changed.
   if (!fragment.payload.empty()) {
     parts_.try_emplace(fragment.offset, fragment.payload.begin(), fragment.payload.end());
   }
@@ -65,7 +65,7 @@ std::vector<std::uint8_t> PartialMessage::take_payload() {
     return only;
   }
 
-  // Each part is freed as soon as it is copied: the message is never held twice.
+  // Each part is freed as soon as it is copied: the message is never in memory twice.
   std::vector<std::uint8_t> payload;
   payload.reserve(payload_bytes_);
   while (!parts_.empty()) {

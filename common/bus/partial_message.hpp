@@ -1,4 +1,4 @@
-// A message of which not all fragments have come yet.
+// A message with missing fragments.
 #pragma once
 
 #include <cstdint>
@@ -11,33 +11,33 @@
 
 namespace understory::bus {
 
-/// The fragments of one message, in any order. Memory follows what has come, never what a header
-/// promises.
+/// The fragments of one message, in any order. Memory grows with the received bytes, never with the
+/// size in a header.
 class PartialMessage {
  public:
-  /// For the message that `first` is a part of; it is not added yet.
+  /// Starts the message of `first`; does not add `first`.
   explicit PartialMessage(const Fragment& first);
 
-  /// Why the fragment does not belong to what is there; none = add() may take it. O(log fragments),
-  /// and O(bytes) for one that is there already.
+  /// The fault of a fragment that contradicts the received ones; none = add() may take it. O(log
+  /// fragments), and O(bytes) for a repeated fragment.
   std::optional<DatagramFault> check(const Fragment& fragment) const;
-  /// Adds a fragment that check() let pass; `now_us` on any clock that goes forward.
+  /// Adds a fragment that check() accepted; `now_us` on any clock that goes forward.
   void add(const Fragment& fragment, std::int64_t now_us);
 
-  /// All fragments are there, and with them every byte.
+  /// Whether all fragments have arrived.
   bool is_complete() const { return fragments_ == count_; }
-  /// All fragments are there and yet not all bytes: the headers lied.
+  /// All fragments have arrived but bytes are missing: the headers are wrong.
   bool is_short() const { return is_complete() && payload_bytes_ != message_size_; }
-  /// Of fragment 0; empty until it has come.
+  /// Channel from fragment 0; empty before it arrives.
   const std::string& channel() const { return channel_; }
-  /// The payload, in order, of a message that is complete; leaves nothing here. O(bytes).
+  /// Moves out the payload of a complete message. O(bytes).
   std::vector<std::uint8_t> take_payload();
 
-  /// What this object holds, with its own bookkeeping [bytes].
+  /// Memory of this object, bookkeeping included [bytes].
   std::size_t held_bytes() const { return held_bytes_; }
-  /// By how much held_bytes() grows with this fragment.
+  /// Increase of held_bytes() by this fragment [bytes].
   static std::size_t cost(const Fragment& fragment);
-  /// When the latest fragment came [us].
+  /// Arrival time of the latest fragment [us].
   std::int64_t touched_us() const { return touched_us_; }
 
  private:

@@ -36,14 +36,14 @@ bool parse_udp_line(const std::string& line, BoundSocket& socket) {
   unsigned raw = 0;
   if (std::sscanf(local.c_str() + colon + 1, "%4x", &port) != 1) return false;
   socket.port = static_cast<std::uint16_t>(port);
-  // The kernel prints the number as it lies in memory.
+  // The kernel prints the number in its memory byte order.
   if (address.size() == 8 && std::sscanf(address.c_str(), "%8x", &raw) == 1) {
     socket.address = ntohl(raw);
   }
   return true;
 }
 
-/// The inode of the socket behind /proc/PID/fd/N; 0 = it is none, or may not be read.
+/// The inode of the socket at /proc/PID/fd/N; 0 = no socket, or not readable.
 std::uint64_t socket_inode(const std::filesystem::path& link) {
   std::error_code error;
   const std::string target = std::filesystem::read_symlink(link, error).string();
@@ -52,7 +52,7 @@ std::uint64_t socket_inode(const std::filesystem::path& link) {
   return inode;
 }
 
-/// "`name` (process 12, " of a process; its name cannot harm a terminal.
+/// "`name` (process 12, " of a process; the name is printable on a terminal.
 std::string process_name(const std::filesystem::path& process) {
   std::string name = text_of(process / "comm");
   while (!name.empty() && name.back() == '\n') name.pop_back();
@@ -61,7 +61,7 @@ std::string process_name(const std::filesystem::path& process) {
   return "`" + name + "` (process " + process.filename().string() + ", ";
 }
 
-/// The processes that hold these sockets, by inode; those that may be looked into.
+/// The processes with these sockets, by inode, as far as they are readable.
 std::map<std::uint64_t, std::string> holders_of(const std::vector<BoundSocket>& sockets) {
   namespace fs = std::filesystem;
   std::map<std::uint64_t, std::string> holders;

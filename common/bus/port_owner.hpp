@@ -1,4 +1,4 @@
-// Which program has a UDP port: for the message when it cannot be shared.
+// Finds the program that has a UDP port, for the error message when the port cannot be shared.
 #pragma once
 
 #include <cstdint>
@@ -7,21 +7,21 @@
 
 namespace understory::bus {
 
-/// A bound UDP socket as the kernel lists it.
+/// A bound UDP socket in the kernel's list.
 struct BoundSocket {
   bool is_any_address = false;
-  std::uint32_t address = 0;  ///< IPv4, host byte order; 0 of an IPv6 socket.
+  std::uint32_t address = 0;  ///< IPv4, host byte order; 0 for an IPv6 socket.
   std::uint16_t port = 0;
   std::uint32_t user = 0;
   std::uint64_t inode = 0;
 };
 
-/// The sockets in the text of /proc/net/udp or udp6; lines of another form are passed over.
+/// The sockets in the text of /proc/net/udp or udp6; lines of another form are skipped.
 std::vector<BoundSocket> parse_udp_table(const std::string& text);
 
-/// Who stands in the way of binding `address` (host byte order) and `port`: "`name` (process 12,
-/// user 0)", up to three of them; the user alone where processes of others cannot be looked into;
-/// "an unknown program" where nothing is listed. Reads /proc of all processes: some milliseconds.
+/// The programs that prevent binding `address` (host byte order) and `port`: "`name` (process 12,
+/// user 0)", at most three; only the user where other users' processes are not readable; "an
+/// unknown program" where none is listed. Reads /proc of all processes: some milliseconds.
 std::string owners_of_udp_port(std::uint32_t address, std::uint16_t port);
 
 }  // namespace understory::bus

@@ -1,4 +1,4 @@
-// What went wrong in a process: how often, when last, and how bad it is.
+// Faults of a process: count, latest occurrence and severity.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@
 
 namespace understory::bus {
 
-/// How bad a reason is while it is fresh (ReasonCounts::kFreshUs).
+/// Severity of a reason while it is fresh (ReasonCounts::kFreshUs).
 enum class Severity : std::uint8_t {
   kNote,      ///< Counted; the state stays OK.
   kDegraded,  ///< Input or output is missing or wrong.
-  kError,     ///< The service does not do what it is for.
+  kError,     ///< The service does not fulfil its function.
 };
 /// The severity of each reason.
 Severity severity(wire::Reason reason);
@@ -28,32 +28,32 @@ bool is_malformed(wire::Reason reason);
 /// Counts reasons by channel and keeps the last one.
 class ReasonCounts {
  public:
-  /// A reason counts towards the state for this long [us].
+  /// Time for which a reason affects the state [us].
   static constexpr std::int64_t kFreshUs = 3000000;
 
-  /// Nothing was wrong so far.
+  /// Starts without faults.
   explicit ReasonCounts(Clock clock);
 
-  /// Counts one; `channel` may be empty, `text` is for a person.
+  /// Counts a reason; `channel` may be empty; `text` is for people.
   void add(std::string_view channel, wire::Reason reason, std::string_view text);
-  /// A condition holds from now on, and counts towards the state as long as it does; `text` is for
-  /// a person. False where it held already.
+  /// A condition begins; it affects the state until its end. `text` is for people. False where it
+  /// held already.
   bool hold(std::string_view channel, wire::Reason reason, std::string_view text);
-  /// A condition does not hold (any more). False where it did not hold before.
+  /// A condition ends. False where it did not hold before.
   bool release(std::string_view channel, wire::Reason reason);
   /// Sets how many datagrams the bus refused so far; an increase of a harmful one becomes the
   /// last reason.
   void set_refused(const DatagramFaults& faults);
-  /// Something is missing that is counted elsewhere (by channel, by datagram): it is the last
-  /// reason, of this code. `text` is for a person.
+  /// Sets the last reason to `code` for a loss that is counted elsewhere (by channel, by datagram).
+  /// `text` is for people.
   void add_degraded(std::string_view code, std::string_view text);
 
-  /// The worst severity that is fresh or of a condition that holds; kNote = nothing is.
+  /// The worst severity of fresh reasons and present conditions; kNote = none.
   Severity fresh() const;
-  /// How often this reason came for this channel.
+  /// Count of this reason on this channel.
   std::int64_t count_of(std::string_view channel, wire::Reason reason) const;
-  /// Writes the counts and the last reason into the message for HEALTH; where conditions hold, the
-  /// worst of them is the last reason.
+  /// Writes the counts and the last reason into the message for HEALTH; the worst present
+  /// condition, if any, is the last reason.
   void fill(health_t& message) const;
 
  private:

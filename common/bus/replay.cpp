@@ -69,14 +69,14 @@ class Replay {
     for (const std::string& channel : node.outputs()) outputs_.insert(channel);
   }
 
-  /// CONFIG comes first, with the log's first stamp.
+  /// Publishes CONFIG first, with the log's first stamp.
   void begin() {
     for (const auto& hosted : hosted_) hosted->node().connect();
     for (const auto& hosted : hosted_) hosted->node().publish_config(hosted->table().to_toml());
     bus_.drain();
   }
 
-  /// What services publish at the end, with the log's last stamp.
+  /// Lets services publish at the end, with the log's last stamp.
   void finish() {
     for (const auto& hosted : hosted_) {
       hosted->adapter().finish();
@@ -103,7 +103,7 @@ class Replay {
     bus_.drain();
   }
 
-  /// Stages that heard nothing would look like a drive on which nothing was found.
+  /// Stages without input would look like a drive without detections.
   [[noreturn]] void refuse_unfed() const {
     std::string channels;
     for (const std::string& channel : channels_) channels += " " + channel;
@@ -146,7 +146,8 @@ class Replay {
   std::vector<std::unique_ptr<HostedService>> hosted_;
   std::set<std::string, std::less<>> outputs_;
   std::set<std::string, std::less<>> names_;
-  std::set<std::string> channels_;  ///< Up to the first event that is fed, for the message.
+  std::set<std::string>
+      channels_;  ///< Channels up to the first event handled, for the error message.
   std::int64_t log_utime_ = 0;
   bool is_feeding_ = false;
   ReplayReport report_;

@@ -22,7 +22,7 @@ constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 constexpr std::int64_t kHealthPeriodUs = 1000000;
-/// A message that changes the state of health is announced at most this often.
+/// A change of the state of HEALTH is published at most at this interval [us].
 constexpr std::int64_t kHealthChangeUs = 100000;
 
 struct Options {
@@ -34,8 +34,8 @@ struct Options {
   bool prints_config = false;
 };
 
-/// SIGTERM and SIGINT as something to poll. Blocked before any thread exists, so that liblcm's
-/// threads inherit it; no handler, no global.
+/// SIGTERM and SIGINT as a descriptor for poll(). Blocked before any thread exists, so that
+/// liblcm's threads inherit the mask; no handler, no global.
 class StopSignal {
  public:
   StopSignal() {
@@ -108,7 +108,7 @@ void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const 
     ::poll(files.data(), files.size(), std::min(wait_ms, health.milliseconds_left()));
   }
 
-  // What finish() publishes is numbered too: the state is saved behind it.
+  // finish() publishes numbered messages too, so the state is saved after it.
   hosted.adapter().finish();
   node.save_snapshot();
   node.monitor().stop();
@@ -146,7 +146,7 @@ std::unique_ptr<StateStore> recover_state(std::unique_ptr<HostedService>& hosted
       std::make_unique<StateStore>(options.state_dir, service.name, StateStore::Saving::kBeside);
 
   if (!hosted->node().recover(*store)) {
-    // The stage may be half loaded: a new one.
+    // The stage may be partly loaded: make a new one.
     store->start_over();
     hosted = make_hosted(service, bus, clock, toml, options);
     hosted->node().tell_of_loss(*store);
@@ -184,7 +184,7 @@ int serve(const Service& service, const Options& options) {
   const auto store = recover_state(hosted, service, *bus, clock, toml, options);
   report_small_buffer(hosted->node(), bus->receive_buffer());
 
-  // Begin: from here on messages come.
+  // Start: messages arrive from here on.
   if (auto* const device = dynamic_cast<Device*>(&hosted->adapter())) {
     if (!options.state_dir.empty()) device->set_state_directory(options.state_dir);
     device->open();
@@ -208,7 +208,7 @@ std::string parameters_help(const Service& service) {
 
 int run_service(const Service& service, int argc, char** argv) {
   keep_freed_memory();
-  // The name that it was called by: a usage line that can be typed.
+  // The name by which it was called, so that the usage line can be typed.
   CLI::App app(service.name + ": " + service.channels.summary(),
                std::filesystem::path(argv[0]).filename().string());
   Options options;

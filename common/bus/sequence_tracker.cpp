@@ -5,7 +5,7 @@
 namespace understory::bus {
 namespace {
 
-/// No sender loses so many at once; a larger step is another sequence (or a hostile number).
+/// A larger step is another sequence (or a hostile number), not a loss.
 constexpr std::int64_t kLargestGap = 1000000;
 
 std::size_t slot(std::int64_t sequence) {
@@ -18,7 +18,7 @@ Arrival SequenceTracker::take(std::int64_t sequence, std::int64_t utime) {
   ++counts_.messages;
   if (newest_sequence_ < 0) return begin(sequence, utime);
 
-  // A smaller number with a newer stamp is no old message: the sender counts from the start again.
+  // A smaller number with a newer stamp is no old message: the sender restarted its count.
   const bool restarted = (sequence <= newest_sequence_ && utime > newest_utime_) ||
                          sequence - newest_sequence_ > kLargestGap;
   if (restarted) {
@@ -47,7 +47,7 @@ Arrival SequenceTracker::take(std::int64_t sequence, std::int64_t utime) {
 
 Arrival SequenceTracker::begin(std::int64_t sequence, std::int64_t utime) {
   resume(sequence, utime);
-  // Those before it may still come.
+  // Earlier ones may still arrive.
   taken_.reset();
   taken_.set(slot(sequence));
   first_sequence_ = sequence;

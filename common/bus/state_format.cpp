@@ -38,7 +38,7 @@ std::string encode_snapshot(std::uint64_t generation, std::string_view state) {
   put(out, state.size(), 8);
   put(out, checksum(state), 8);
   out.append(state);
-  // The header's numbers are covered too.
+  // The checksum covers the header's numbers too.
   put(out, checksum(out), 8);
   return out;
 }

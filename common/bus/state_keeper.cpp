@@ -18,7 +18,7 @@ bool StateKeeper::is_due(std::int64_t now) {
   if (store_ == nullptr || events_ == 0 || store_->is_saving()) return false;
   if (period_start_ < 0 || period_start_ > now) period_start_ = now;
 
-  // After a failure (e.g. a full disk) it is tried again once a second, not at every event.
+  // After a failure (e.g. a full disk) the save is repeated once a second, not at every event.
   constexpr std::int64_t kRetryUs = 1000000;
   const bool has_waited = tried_utime_ < 0 || now - tried_utime_ >= kRetryUs;
   const bool is_due =

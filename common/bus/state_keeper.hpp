@@ -1,4 +1,4 @@
-// When a service's inputs are journaled and when a snapshot of its state is due.
+// Decides when a service's inputs are journaled and when a snapshot is due.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,7 @@
 
 namespace understory::bus {
 
-/// Between a node and its store. Keeps nothing as long as there is no store. Times are message time
-/// [us].
+/// Connects a node and its store. Without a store it saves nothing. Times are message time [us].
 class StateKeeper {
  public:
   /// A snapshot is due after this much message time or this many inputs, whichever comes first.
@@ -28,25 +27,26 @@ class StateKeeper {
   }
   /// The state of time `utime` was loaded.
   void resume(std::int64_t utime) { saved_utime_ = period_start_ = utime; }
-  /// This many inputs were fed since that state.
+  /// Sets the number of inputs since that state.
   void set_events(int events) { events_ = events; }
 
-  /// The store could not be opened for writing: as after a refusal.
+  /// The store could not be opened for writing; treated like a refusal.
   void start_failed() { is_failing_ = true; }
 
-  /// Journals an input before it is handled. A refusal: the device fails.
+  /// Journals an input before it is handled. Returns a refusal where the device fails.
   std::optional<wire::Refusal> append(std::string_view channel,
                                       std::span<const std::uint8_t> bytes);
   /// Whether a snapshot should be saved now.
   bool is_due(std::int64_t now);
-  /// Saves what `make_state` gives, or begins to (StateStore::Saving). Without a store, or before
-  /// the first message (now < 0), does nothing. A refusal: the device fails, or `make_state` threw.
+  /// Saves the result of `make_state`, or starts to (StateStore::Saving). Does nothing without a
+  /// store or before the first message (now < 0). Returns a refusal where the device fails or
+  /// `make_state` throws.
   std::optional<wire::Refusal> save(std::int64_t now,
                                     const std::function<std::string()>& make_state);
-  /// The end of a snapshot that was written beside, once.
+  /// Result of a snapshot written in the background; returned once.
   std::optional<StateStore::Kept> settle();
 
-  /// Whether something could not be kept, and no snapshot has made up for it yet.
+  /// Whether something could not be saved and no later snapshot has replaced it.
   bool is_failing() const { return is_failing_; }
   /// Time of the last state saved or loaded; -1 = none.
   std::int64_t saved_utime() const { return saved_utime_; }
@@ -63,7 +63,7 @@ class StateKeeper {
   std::int64_t tried_utime_ = -1;
   std::int64_t period_start_ = -1;
   int events_ = 0;        // since the snapshot
-  int saved_events_ = 0;  // of them before the one that is being written
+  int saved_events_ = 0;  // of them before the snapshot in writing
   bool is_failing_ = false;
 };
 

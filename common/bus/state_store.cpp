@@ -24,15 +24,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A link in place of a state file could lead to anybody's file.
+/// A link in place of a state file could lead to any file.
 constexpr int kOwn = O_NOFOLLOW | O_CLOEXEC;
 
-/// A recovery that died this often is not tried again with the journal, then not with the snapshot.
+/// After this many failed recoveries the journal is left out; after further ones the snapshot.
 constexpr int kAttemptsWithJournal = 2;
 constexpr int kAttemptsWithSnapshot = 4;
 
-/// None where there is no file that can be read, or a symbolic link: state is never read or written
-/// through one.
+/// None where the file is not readable or is a symbolic link: state is never read or written
+/// through a link.
 std::optional<std::string> read_file(const fs::path& file) {
   const int in = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (in < 0) return std::nullopt;
@@ -47,8 +47,8 @@ std::optional<std::string> read_file(const fs::path& file) {
   return text;
 }
 
-/// By errno. Where the folder is missing the cause is why it cannot be made; a folder that was
-/// removed is there for the next attempt.
+/// The refusal by errno. If the folder is missing, it is created for the next attempt; if that
+/// fails, the refusal has that cause.
 wire::Refusal not_kept(const fs::path& file) {
   std::error_code why(errno, std::system_category());
   std::error_code not_made;
@@ -67,7 +67,8 @@ bool write_all(int file, std::string_view bytes) {
   return true;
 }
 
-/// Whole or not at all: the name points to the old content until the new one is on the device.
+/// Writes completely or not at all: the name points to the old content until the new content is on
+/// the device.
 std::optional<wire::Refusal> replace_file(const fs::path& file, std::string_view bytes) {
   const fs::path temporary = file.string() + ".new";
   const int out = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | kOwn, 0644);
@@ -97,9 +98,9 @@ void StateStore::lock() {
   std::error_code ignored;
   fs::create_directories(directory_, ignored);
   lock_ = ::open(path(".lock").c_str(), O_RDWR | O_CREAT | kOwn, 0644);
-  // On a disk that has become read-only, an existing file can be locked all the same.
+  // On a disk that has become read-only, an existing file can still be locked.
   if (lock_ < 0 && errno == EROFS) lock_ = ::open(path(".lock").c_str(), O_RDONLY | kOwn);
-  // Where no file can be made, no journal can be either: open() reports that.
+  // If no file can be created, no journal can be either; open() reports that.
   if (lock_ < 0) return;
   if (::flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
   ::close(std::exchange(lock_, -1));
@@ -175,7 +176,7 @@ StateStore::Recovered StateStore::open() {
     }
   }
 
-  // Events that followed a lost snapshot mean nothing without it; only journal 0 starts at nothing.
+  // Events after a lost snapshot are useless without it; only journal 0 starts from an empty state.
   const std::uint64_t first = generation_;
   const std::uint64_t valid_bytes = snapshot_is_lost ? 0 : take_journals(recovered);
   newest_ = generation_;
@@ -184,8 +185,8 @@ StateStore::Recovered StateStore::open() {
   return recovered;
 }
 
-/// The events of journal generation_ and those that follow it without a hole; generation_ is then
-/// the last of them, of which so many bytes are whole.
+/// Reads journal generation_ and those that follow without a missing number. Sets generation_ to
+/// the last one and returns its readable length [bytes].
 std::uint64_t StateStore::take_journals(Recovered& recovered) {
   std::uint64_t valid_bytes = 0;
   for (std::uint64_t number = generation_;; ++number) {
@@ -216,7 +217,7 @@ std::optional<wire::Refusal> StateStore::open_journal(std::uint64_t valid_bytes)
   return std::nullopt;
 }
 
-/// Numbers of the journals that are there.
+/// Numbers of the existing journals.
 std::vector<std::uint64_t> StateStore::journals() const {
   const std::string begin = name_ + ".journal.";
   std::vector<std::uint64_t> numbers;
@@ -265,11 +266,11 @@ std::optional<wire::Refusal> StateStore::append(std::string_view channel,
 }
 
 std::optional<wire::Refusal> StateStore::save(std::string state) {
-  lock();  // Where the directory could not be made before, it may be possible now.
+  lock();  // The directory may be creatable now.
   if (writing_.valid()) ended(writing_.get());
 
-  // What comes from here on follows the new snapshot, and the one before as well until the new one
-  // is on the device. Behind a hole nothing follows the one before.
+  // Later inputs follow the new snapshot and, until that is on the device, also the previous one.
+  // After lost inputs they do not follow the previous one.
   const bool leaves_hole = journal_broken_;
   const std::uint64_t before = std::exchange(generation_, newest_ + (leaves_hole ? 2 : 1));
   newest_ = generation_;
@@ -288,7 +289,7 @@ std::optional<wire::Refusal> StateStore::save(std::string state) {
   return std::nullopt;
 }
 
-/// Reads nothing that changes: it may run beside the rest.
+/// Reads no member that changes, so it may run in another thread.
 StateStore::Kept StateStore::write_snapshot(std::uint64_t generation,
                                             const std::string& state) const {
   if (auto refusal = replace_file(path(".snapshot"), encode_snapshot(generation, state)))

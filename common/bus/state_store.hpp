@@ -1,4 +1,4 @@
-// A service's state on disk: a snapshot and the input events since. Together they survive SIGKILL
+// A service's state on disk: a snapshot and the later input events. Together they survive SIGKILL
 // at any moment.
 #pragma once
 
@@ -15,68 +15,68 @@
 
 namespace understory::bus {
 
-/// One input message as it came.
+/// One received input message.
 struct JournalEvent {
   std::string channel;
   std::vector<std::uint8_t> bytes;
 };
 
 /// Files NAME.snapshot and NAME.journal.G in one directory, G counting snapshots, and NAME.lock,
-/// which the kernel releases when the process dies, however it does: one process at a time. A
-/// symbolic link in place of one of them is never followed.
+/// which admits one process at a time; the kernel releases it when the process dies. Symbolic links
+/// are never followed.
 ///
-/// A snapshot is written whole or not at all (temporary file, flushed, renamed), with a checksum.
-/// An event is one write(), so what a killed process leaves behind is whole events and at most one
-/// torn one at the end. Inputs that come while a snapshot is written go into the next journal:
-/// G, G + 1, ... together are what came since snapshot G. A number that is left out is a hole.
+/// A snapshot is written completely or not at all (temporary file, flushed, renamed), with a
+/// checksum. An event is one write(), so a killed process leaves whole events and at most one torn
+/// event at the end. Inputs during the writing of a snapshot go into the next journal: journals G,
+/// G + 1, ... contain all inputs since snapshot G. A missing number means lost inputs.
 class StateStore {
  public:
-  /// Where a snapshot is written and flushed: in save(), or in a thread beside it. A slow device
-  /// takes seconds.
+  /// Whether a snapshot is written and flushed in save() or in a background thread. A slow device
+  /// needs seconds.
   enum class Saving : std::uint8_t { kAtOnce, kBeside };
-  /// How a snapshot ended: none = it is kept.
+  /// Result of a snapshot: none = saved.
   using Kept = std::optional<wire::Refusal>;
 
-  /// `name`: the service's. Touches no file before open() or start_over().
+  /// `name`: name of the service. Accesses no file before open() or start_over().
   StateStore(std::filesystem::path directory, std::string name, Saving saving = Saving::kAtOnce);
-  /// Waits for the snapshot that is being written.
+  /// Waits for a snapshot in writing.
   ~StateStore();
   StateStore(const StateStore&) = delete;
   StateStore& operator=(const StateStore&) = delete;
 
-  /// What a process finds of its predecessor.
+  /// The saved state of an earlier process.
   struct Recovered {
     std::optional<std::string> snapshot;
-    std::vector<JournalEvent> events;     ///< Since the snapshot, in order.
-    std::vector<wire::Refusal> problems;  ///< What was damaged and is lost.
+    std::vector<JournalEvent> events;     ///< Inputs since the snapshot, in order.
+    std::vector<wire::Refusal> problems;  ///< Damaged and lost parts.
   };
-  /// Reads what is there and starts to journal behind it. When earlier recoveries died on the way
-  /// (begin_recovery without end_recovery), the journal is put aside, later the snapshot too.
-  /// Throws std::runtime_error naming the lock where another process keeps its state here.
+  /// Reads the files and continues the journal. If earlier recoveries died before end_recovery(),
+  /// the journal is put aside, after further ones the snapshot too. Throws std::runtime_error with
+  /// the name of the lock where another process uses these files.
   Recovered open();
-  /// The stage has taken what open() gave and lives.
+  /// The stage has processed the result of open().
   void end_recovery();
 
-  /// Puts everything aside and starts empty. Throws as open() does.
+  /// Puts all files aside and starts empty. Throws as open() does.
   void start_over();
 
-  /// Writes one input behind the snapshot, in one write(). Refused as kStateNotKept where the
-  /// device fails; needs_snapshot() is then true.
+  /// Appends one input to the journal, in one write(). Refused as kStateNotKept where the device
+  /// fails; needs_snapshot() is then true.
   std::optional<wire::Refusal> append(std::string_view channel,
                                       std::span<const std::uint8_t> bytes);
-  /// Writes a snapshot, which replaces the one before and its journals; waits for one that is being
-  /// written. Refused as kStateNotKept where the device fails; the one before then stays. With
-  /// kBeside the end is told by finished(). Throws as open() does.
+  /// Writes a snapshot, which replaces the previous one and its journals; waits for a snapshot in
+  /// writing. Refused as kStateNotKept where the device fails; the previous one then stays. With
+  /// kBeside, finished() returns the result. Throws as open() does.
   std::optional<wire::Refusal> save(std::string state);
-  /// Whether a snapshot is being written beside.
+  /// Whether a snapshot is being written in the background.
   bool is_saving() const { return writing_.valid(); }
-  /// The end of a snapshot that was written beside, once: kept or refused. None before.
+  /// Result of a snapshot written in the background; returned once. None before its end.
   std::optional<Kept> finished();
 
-  /// True after a failed append: the journal has a hole, only a snapshot makes the state whole.
+  /// True after a failed append: the journal lacks an input, and only a snapshot makes the state
+  /// complete.
   bool needs_snapshot() const { return journal_broken_; }
-  /// Where a snapshot was put aside and none has been saved since: when it was written [s since
-  /// 1970].
+  /// Writing time [s since 1970] of a snapshot that was put aside, if none has been saved since.
   std::optional<std::int64_t> lost_snapshot_s() const;
   /// Size of the journal [bytes].
   std::uint64_t journal_bytes() const { return journal_bytes_; }
@@ -98,14 +98,15 @@ class StateStore {
   std::filesystem::path directory_;
   std::string name_;
   Saving saving_;
-  std::uint64_t generation_ = 0;  ///< Of the journal that is written.
-  std::uint64_t newest_ = 0;      ///< Of those that were begun, also in vain.
-  std::future<Kept> writing_;     ///< Valid while a snapshot is written beside.
+  std::uint64_t generation_ = 0;  ///< Number of the present journal.
+  std::uint64_t newest_ = 0;      ///< Largest number used so far, failed ones included.
+  std::future<Kept> writing_;     ///< Valid while a snapshot is written in the background.
   int journal_ = -1;
   int lock_ = -1;
   std::uint64_t journal_bytes_ = 0;
   bool journal_broken_ = false;
-  bool is_behind_hole_ = false;  ///< The journal follows a hole; only a snapshot makes up for it.
+  bool is_behind_hole_ =
+      false;  ///< Inputs before this journal are lost; only a snapshot completes the state.
 };
 
 }  // namespace understory::bus

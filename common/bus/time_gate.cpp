@@ -10,7 +10,7 @@ MessageClock::Verdict TimeGate::take(const BusMessage& message, std::int64_t uti
   const std::int64_t before = clock_.now();
   const Verdict verdict = clock_.take(utime, pace);
 
-  // Those that waited are wrong where this one is no proof of them.
+  // The waiting messages are wrong if this one does not prove them.
   const bool ends =
       verdict == Verdict::kQuarantined || (verdict == Verdict::kFine && !clock_.is_waiting());
   if (ends && !held_.empty()) wrong_ = std::exchange(held_, {});

@@ -1,4 +1,4 @@
-// Messages whose stamps wait for proof.
+// Holds messages whose stamps wait for proof.
 #pragma once
 
 #include <cstdint>
@@ -10,31 +10,32 @@
 
 namespace understory::bus {
 
-/// A copy of a message that waits.
+/// A copy of a waiting message.
 struct HeldMessage {
   std::string channel;
   std::vector<std::uint8_t> bytes;
   std::int64_t utime = 0;
 
-  /// Its view, valid as long as this is. Latency does not count: it is the pause, not the work.
+  /// A view, valid as long as this object. It has no reception time: the wait must not count as
+  /// latency.
   BusMessage view() const { return {channel, bytes, 0}; }
 };
 
-/// The clock of a service, with the messages that it does not believe yet: none is lost where time
-/// really went on elsewhere. At most two wait.
+/// The clock of a service, and the messages that it does not believe yet: no message is lost if
+/// time really jumped. At most two wait.
 class TimeGate {
  public:
-  /// `largest_jump_us`: MessageClock's.
+  /// `largest_jump_us`: limit of MessageClock.
   explicit TimeGate(std::int64_t largest_jump_us) : clock_(largest_jump_us) {}
 
-  /// Takes the stamp of a message [us]; see MessageClock::take. A message that waits is copied. At
-  /// kJumped now() is still what it was: the messages of jumped() are to be fed again, this one
-  /// among them.
+  /// Takes the stamp of a message [us]; see MessageClock::take. A waiting message is copied. At
+  /// kJumped, now() is still unchanged: the caller must handle all messages of jumped() again, this
+  /// one included.
   MessageClock::Verdict take(const BusMessage& message, std::int64_t utime,
                              const ChannelPace& pace);
-  /// After kJumped: all that waited, in order, and the one that proved it.
+  /// After kJumped: all waiting messages in order, and the one that proved them.
   std::vector<HeldMessage> jumped();
-  /// After any verdict: those that waited and were found wrong.
+  /// After any verdict: the waiting messages that proved wrong.
   std::vector<HeldMessage> wrong();
 
   /// Newest believed stamp [us]; -1 before the first.

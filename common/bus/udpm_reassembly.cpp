@@ -7,7 +7,7 @@
 namespace understory::bus {
 namespace {
 
-/// Stale messages are looked for this often [us].
+/// Interval of the search for stale messages [us].
 constexpr std::int64_t kSweepPeriodUs = 100000;
 
 }  // namespace
@@ -25,7 +25,7 @@ UdpmReassembler::Taken UdpmReassembler::refuse(DatagramFault fault) {
 
 UdpmReassembler::Taken UdpmReassembler::take(std::span<const std::uint8_t> datagram,
                                              DatagramSender sender, std::int64_t now_us) {
-  if (!payload_.empty()) payload_ = {};  // a large message is not kept longer than promised
+  if (!payload_.empty()) payload_ = {};  // a large message is freed as documented
   drop_stale(now_us);
   const auto decoded = decode_datagram(datagram);
   if (const auto* fault = std::get_if<DatagramFault>(&decoded)) return refuse(*fault);
@@ -43,7 +43,7 @@ UdpmReassembler::Taken UdpmReassembler::take(std::span<const std::uint8_t> datag
 
 UdpmReassembler::Taken UdpmReassembler::take_fragment(const Fragment& fragment, DatagramSender from,
                                                       std::int64_t now_us) {
-  // Does it fit to what is there, and does anybody want it?
+  // Is it consistent with earlier fragments, and is its channel subscribed?
   const auto known = senders_.find(from);
   if (known != senders_.end()) {
     if (const auto taken = take_of_known(fragment, known->second)) return *taken;
@@ -53,7 +53,7 @@ UdpmReassembler::Taken UdpmReassembler::take_fragment(const Fragment& fragment, 
     return {};
   }
 
-  // A place in the tables, then memory.
+  // Reserve a place in the tables, then memory.
   if (!make_place(fragment, from)) return refuse(DatagramFault::kNoRoom);
   const auto sender = senders_.try_emplace(from).first;
   const auto [half, is_new] = sender->second.messages.try_emplace(fragment.sequence, fragment);
@@ -85,7 +85,7 @@ const UdpmReassembler::Settled* UdpmReassembler::Sender::settled_message(
   return found == settled.rend() ? nullptr : &*found;
 }
 
-/// What becomes of a fragment by what is known of its message; none = it may be added.
+/// The result for a fragment of a known message; none = it may be added.
 std::optional<UdpmReassembler::Taken> UdpmReassembler::take_of_known(const Fragment& fragment,
                                                                      const Sender& sender) {
   const auto half = sender.messages.find(fragment.sequence);
@@ -103,7 +103,7 @@ bool UdpmReassembler::is_unwanted(const Fragment& fragment) const {
   return fragment.number == 0 && wanted_ && !wanted_(fragment.channel);
 }
 
-/// What came of the message goes, and what will come of it is known.
+/// Drops the received fragments of the message and marks its later ones as unwanted.
 void UdpmReassembler::throw_away(const Fragment& fragment, DatagramSender from,
                                  std::int64_t now_us) {
   if (!senders_.contains(from) && !make_place(fragment, from)) return;
@@ -131,7 +131,8 @@ UdpmReassembler::Taken UdpmReassembler::finish(Sender& sender, Messages::iterato
   return {Message{channel_, payload_}, std::nullopt};
 }
 
-/// A place in the table of senders and among the sender's messages; false = others have more right.
+/// Makes a place in the table of senders and among the sender's messages; false = other senders
+/// have priority.
 bool UdpmReassembler::make_place(const Fragment& fragment, DatagramSender from) {
   const auto known = senders_.find(from);
   if (known != senders_.end()) {
@@ -154,7 +155,7 @@ bool UdpmReassembler::make_place(const Fragment& fragment, DatagramSender from) 
   return true;
 }
 
-/// Memory for `bytes` more of a message; false = there is none without taking from who holds less.
+/// Makes room for `bytes` more of a message; false = only senders that use less could free it.
 bool UdpmReassembler::make_room(std::size_t bytes, Senders::iterator sender,
                                 std::uint32_t sequence) {
   while (sender->second.held_bytes + bytes > limits_.sender_bytes) {
@@ -179,8 +180,7 @@ bool UdpmReassembler::make_room(std::size_t bytes, Senders::iterator sender,
   return true;
 }
 
-/// Drops the message of which nothing came for the longest time; false = there is no other than
-/// the one that is spared.
+/// Drops the message with the oldest latest fragment; false = there is none except the spared one.
 bool UdpmReassembler::drop_oldest(Sender& sender, const std::uint32_t* spared) {
   auto oldest = sender.messages.end();
   for (auto one = sender.messages.begin(); one != sender.messages.end(); ++one) {

@@ -1,5 +1,5 @@
-// Whole messages out of LCM's datagrams, whoever sends them and whatever is in them. No socket, no
-// clock, no thread.
+// Assembles LCM's datagrams to messages; safe against any sender and content. No socket, no clock,
+// no thread.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace understory::bus {
 
-/// Who sent a datagram: IPv4 address and UDP port. One LCM instance is one sender.
+/// The sender of a datagram: IPv4 address and UDP port. One LCM instance is one sender.
 struct DatagramSender {
   std::uint32_t address = 0;  ///< Host byte order.
   std::uint16_t port = 0;
@@ -31,30 +31,29 @@ struct DatagramSender {
   }
 };
 
-/// How much may wait for its other fragments. Bookkeeping counts as well as payload.
+/// Limits for incomplete messages. Bytes include bookkeeping.
 struct ReassemblyLimits {
-  /// One sender: the largest message in 65,535 fragments with 256 bytes of bookkeeping each. An
+  /// For one sender: the largest message in 65,535 fragments with 256 bytes of bookkeeping each. An
   /// honest sender finishes a message before it begins the next.
   std::size_t sender_bytes = kLargestMessage + (std::size_t{1} << 24U);
-  /// All senders: one message of the largest size beside 64 MiB of others.
+  /// For all senders: one message of the largest size and 64 MiB of others.
   std::size_t total_bytes = kLargestMessage + (std::size_t{1} << 26U);
-  /// Half messages of one sender: packets that overtake each other need a few, loss leaves some.
+  /// Incomplete messages of one sender: some from reordered packets, some from loss.
   std::size_t messages_of_sender = 16;
-  /// Senders with half messages: a few processes on a few computers, and spare ones.
+  /// Senders with incomplete messages: a few processes on a few computers, with margin.
   std::size_t senders = 256;
-  /// Half messages are given up when no fragment has come for so long [us]. Fragments are sent
-  /// without a pause; this covers a sender that lost its processor.
+  /// An incomplete message is dropped after this time without a fragment [us]. Fragments are sent
+  /// without a pause; this covers a sender that was not scheduled.
   std::int64_t stale_us = 2000000;
-  /// Messages of one sender that were given or thrown away and of which more fragments may come.
+  /// Messages of one sender that were delivered or dropped and of which more fragments may arrive.
   std::size_t settled_of_sender = 64;
 };
 
-/// Joins fragments of the channels that somebody wants; the others' are thrown away as soon as
-/// fragment 0 has named the channel. Fragments of a message that was given already (two routes to
-/// one group) are counted, not kept. When room is short the largest holder loses its oldest half
-/// message, so nobody is pushed out who holds less than an equal share; a sender that comes when
-/// the table is full takes the place of one that holds less than the newcomer brings, or is
-/// refused.
+/// Joins fragments of subscribed channels; those of other channels are dropped as soon as fragment
+/// 0 has named the channel. Fragments of a message that was delivered already (two routes to one
+/// group) are counted and dropped. When memory is short, the sender that uses most loses its oldest
+/// incomplete message, so a sender below an equal share loses none. When the table is full, a new
+/// sender replaces a sender that uses less than the new fragment needs, or is refused.
 class UdpmReassembler {
  public:
   /// A message; the views are valid until the next take() and as long as the datagram is.
@@ -62,28 +61,29 @@ class UdpmReassembler {
     std::string_view channel;
     std::span<const std::uint8_t> bytes;
   };
-  /// Whether anybody listens to a channel.
+  /// Whether a channel is subscribed.
   using Wanted = std::function<bool(std::string_view channel)>;
-  /// What became of a datagram; neither = it is kept until the others come, or nobody wants it.
+  /// The result of a datagram; neither = it waits for other fragments, or its channel is not
+  /// subscribed.
   struct Taken {
     std::optional<Message> message;
     std::optional<DatagramFault> fault;
   };
 
-  /// Nothing waits. `wanted` is asked once for each message in fragments; none = all are wanted.
+  /// Starts empty. `wanted` is called once for each message in fragments; none = all are wanted.
   explicit UdpmReassembler(ReassemblyLimits limits = {}, Wanted wanted = {})
       : limits_(limits), wanted_(std::move(wanted)) {}
 
   /// Takes one datagram; `now_us` by a clock that goes forward. A fault is counted. Throws
-  /// std::bad_alloc, with nothing changed but what was dropped to make room. O(log fragments +
-  /// bytes); O(senders) more where room is short.
+  /// std::bad_alloc; then only messages dropped for memory have changed. O(log fragments + bytes);
+  /// O(senders) more where memory is short.
   Taken take(std::span<const std::uint8_t> datagram, DatagramSender sender, std::int64_t now_us);
 
-  /// What was refused or given up so far.
+  /// Counts of refused and dropped datagrams so far.
   const DatagramFaults& faults() const { return faults_; }
-  /// What waits, with its bookkeeping [bytes].
+  /// Memory of incomplete messages, bookkeeping included [bytes].
   std::size_t held_bytes() const { return held_bytes_; }
-  /// How many half messages wait.
+  /// Number of incomplete messages.
   std::size_t held_messages() const;
 
  private:
@@ -92,7 +92,7 @@ class UdpmReassembler {
     std::uint32_t sequence = 0;
     std::uint32_t message_size = 0;
     std::uint16_t count = 0;
-    bool was_given = false;  // false: nobody wanted it
+    bool was_given = false;  // false: its channel is not subscribed
     std::int64_t settled_us = 0;
   };
   struct Sender {
@@ -123,8 +123,8 @@ class UdpmReassembler {
   Senders senders_;
   std::size_t held_bytes_ = 0;
   std::int64_t swept_us_ = 0;
-  std::string channel_;                // of the message given last
-  std::vector<std::uint8_t> payload_;  // its bytes
+  std::string channel_;                // of the message delivered last
+  std::vector<std::uint8_t> payload_;  // its payload
   DatagramFaults faults_;
 };
 

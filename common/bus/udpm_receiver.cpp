@@ -23,7 +23,7 @@ std::int64_t steady_us() {
       .count();
 }
 
-/// Threads that are made while this lives take no signal.
+/// Threads created during its lifetime receive no signals.
 class SignalsBlocked {
  public:
   SignalsBlocked() {
@@ -107,7 +107,7 @@ void UdpmReceiver::take_in_joined() {
   joined_.clear();
 }
 
-/// Reads the sockets of which nothing waits; false = they have nothing.
+/// Reads the sockets without waiting datagrams; false = they returned none.
 bool UdpmReceiver::read_sockets() {
   bool has_more = false;
   for (Group& group : groups_) {
@@ -118,7 +118,7 @@ bool UdpmReceiver::read_sockets() {
   return has_more;
 }
 
-/// The group whose first datagram came first; null = nothing waits.
+/// The group with the earliest waiting datagram; null = none waits.
 UdpmReceiver::Group* UdpmReceiver::earliest() {
   Group* result = nullptr;
   for (Group& group : groups_) {
@@ -130,8 +130,8 @@ UdpmReceiver::Group* UdpmReceiver::earliest() {
   return result;
 }
 
-/// Until one of the sockets is to be read again. A socket that is empty was read after everything
-/// that waits had come: nothing earlier can be in it.
+/// Handles datagrams until one socket must be read again. An empty socket was read after all
+/// waiting datagrams had arrived, so it has no earlier one.
 void UdpmReceiver::take_batch() {
   while (read_sockets()) {
   }
@@ -143,14 +143,14 @@ void UdpmReceiver::take_batch() {
   }
 }
 
-/// The first that waits.
+/// Handles the group's first waiting datagram.
 void UdpmReceiver::take(const Group& group, std::int64_t now_us) {
   const ReceivedDatagram& datagram = group.waiting.front();
   if (!group.is_open && !own_addresses_.contains(datagram.sender.address, now_us))
     return own_faults_.add(DatagramFault::kFromOutside);
   try {
     const auto taken = reassembler_.take(datagram.bytes, datagram.sender, now_us);
-    if (taken.fault) note_faults();  // before what comes behind it is handed out
+    if (taken.fault) note_faults();  // before later messages are delivered
     if (taken.message) {
       sink_(taken.message->channel, taken.message->bytes, datagram.received_ns / 1000);
     }

@@ -12,10 +12,10 @@
 
 namespace understory::bus {
 
-/// Reads the sockets of one or more groups, joins fragments of wanted channels, gives away whole
-/// messages in the order in which the kernel received them, over all groups: also after a pause of
-/// the process, when each socket holds what came meanwhile. The thread is there so that a handler
-/// that takes long costs no datagram: stock Debian's socket buffer holds 208 KiB.
+/// Reads the sockets of one or more groups, joins fragments of wanted channels, and delivers whole
+/// messages of all groups in the order in which the kernel received them, also after a pause of the
+/// process. The thread prevents loss during a long handler: Debian's default socket buffer has 208
+/// KiB.
 class UdpmReceiver {
  public:
   /// Called with each message, in the receiving thread; the views are valid during the call only.
@@ -23,7 +23,7 @@ class UdpmReceiver {
   using Sink = std::function<void(std::string_view channel, std::span<const std::uint8_t> bytes,
                                   std::int64_t received_us)>;
 
-  /// Begins to receive; signals stay with the other threads. `wanted` is called in the receiving
+  /// Starts to receive; signals go to the other threads. `wanted` is called in the receiving
   /// thread. Throws BusError.
   UdpmReceiver(UdpmReassembler::Wanted wanted, Sink sink);
   /// Waits for the thread: at most one batch of datagrams.
@@ -31,18 +31,17 @@ class UdpmReceiver {
   UdpmReceiver(const UdpmReceiver&) = delete;
   UdpmReceiver& operator=(const UdpmReceiver&) = delete;
 
-  /// Joins one more group; `url` is for messages. Of a TTL of 0 what comes from other computers is
-  /// refused. Returns the receive buffer that the kernel grants
-  /// [bytes]. Throws BusError.
+  /// Joins one more group; `url` is for messages. With a TTL of 0, datagrams from other computers
+  /// are refused. Returns the receive buffer that the kernel grants [bytes]. Throws BusError.
   std::int64_t join(const UdpmUrl& network, const std::string& url);
-  /// What was refused so far: all that came before the message given last.
+  /// Counts of refused datagrams up to the message delivered last.
   DatagramFaults faults() const;
 
  private:
-  /// A socket, and what was read from it and not handled yet.
+  /// A socket, and its datagrams that are not handled yet.
   struct Group {
     std::unique_ptr<UdpmSocket> socket;
-    bool is_open = false;  ///< To other computers.
+    bool is_open = false;  ///< Open to other computers.
     std::span<const ReceivedDatagram> waiting = {};
   };
 
@@ -55,15 +54,15 @@ class UdpmReceiver {
   void note_faults();
 
   Sink sink_;
-  std::vector<Group> groups_;    // the thread's alone
-  UdpmReassembler reassembler_;  // the thread's alone
-  OwnAddresses own_addresses_;   // the thread's alone
-  DatagramFaults own_faults_;    // the thread's alone: not the reassembler's
+  std::vector<Group> groups_;    // used by the thread alone
+  UdpmReassembler reassembler_;  // used by the thread alone
+  OwnAddresses own_addresses_;   // used by the thread alone
+  DatagramFaults own_faults_;    // used by the thread alone; not the reassembler's faults
   mutable std::mutex mutex_;
-  std::vector<Group> joined_;  // guarded by mutex_: the thread takes them
+  std::vector<Group> joined_;  // guarded by mutex_; the thread moves them to groups_
   bool ends_ = false;          // guarded by mutex_
   DatagramFaults faults_;      // guarded by mutex_
-  int wake_ = -1;              // readable: a group was joined, or the thread ends
+  int wake_ = -1;              // readable when a group was joined or the thread shall end
   std::thread thread_;
 };
 

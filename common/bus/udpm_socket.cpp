@@ -18,7 +18,7 @@ namespace understory::bus {
 namespace {
 
 constexpr std::size_t kBatch = 16;
-/// More than a datagram can have: none is ever cut.
+/// More than the largest datagram: none is truncated.
 constexpr std::size_t kDatagramBytes = 65536;
 
 [[noreturn]] void fail_to_join(const std::string& url, const std::string& what) {
@@ -26,7 +26,7 @@ constexpr std::size_t kDatagramBytes = 65536;
 }
 
 void set_option(int file, int level, int name, int value) {
-  // What is refused here only costs comfort: the caller reads back what matters.
+  // A refused option is not fatal: the caller reads back the values that matter.
   ::setsockopt(file, level, name, &value, sizeof(value));
 }
 
@@ -71,10 +71,10 @@ std::int64_t granted_buffer(int file) {
   int granted = 0;
   socklen_t size = sizeof(granted);
   ::getsockopt(file, SOL_SOCKET, SO_RCVBUF, &granted, &size);
-  return granted / 2;  // the kernel reports twice what may be used
+  return granted / 2;  // the kernel reports twice the usable size
 }
 
-/// The memory of one call of recvmmsg; pages that no datagram reached are never touched.
+/// The memory of one call of recvmmsg; unused pages are never touched.
 class UdpmSocket::Batch {
  public:
   std::span<const ReceivedDatagram> receive(int file) {

@@ -1,4 +1,4 @@
-// The socket that hears a multicast group.
+// The receiving socket of a multicast group.
 #pragma once
 
 #include <cstdint>
@@ -14,28 +14,27 @@ namespace understory::bus {
 /// The receive buffer that the kernel grants to a socket [bytes].
 std::int64_t granted_buffer(int file);
 
-/// A datagram as it came.
+/// A received datagram.
 struct ReceivedDatagram {
   std::span<const std::uint8_t> bytes;
   DatagramSender sender;
   std::int64_t received_ns = 0;  ///< Wall clock of the kernel.
 };
 
-/// Bound to group and port, shared with every process that shares it too (SO_REUSEADDR, as liblcm
-/// does), so that several hear the group on one computer. Hears its group only, and no unicast.
+/// Bound to group and port with SO_REUSEADDR, as liblcm does, so that several processes of one
+/// computer receive the group. Receives its group only, no unicast.
 class UdpmSocket {
  public:
-  /// Joins the group; `url` is for messages. Throws BusError: the port belongs to a program that
-  /// does not share it (named), the group has no route, no descriptor is left.
+  /// Joins the group; `url` is for messages. Throws BusError: another program has the port and does
+  /// not share it (the message names it), the group has no route, or no descriptor is left.
   UdpmSocket(const UdpmUrl& network, const std::string& url);
   ~UdpmSocket();
   UdpmSocket(const UdpmSocket&) = delete;
   UdpmSocket& operator=(const UdpmSocket&) = delete;
 
-  /// What has come, without waiting: up to 16 datagrams by one call of the kernel. Valid until the
-  /// next call.
+  /// Waiting datagrams, at most 16, by one system call without waiting. Valid until the next call.
   std::span<const ReceivedDatagram> receive();
-  /// Readable when something has come.
+  /// Readable when a datagram waits.
   int file_descriptor() const { return file_; }
   /// The receive buffer that the kernel grants [bytes].
   std::int64_t granted_bytes() const { return granted_bytes_; }

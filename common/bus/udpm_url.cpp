@@ -31,7 +31,7 @@ std::uint32_t group_address(const std::string& text, const std::string& url) {
   return ntohl(address.s_addr);
 }
 
-/// The value of a key in `key=value&key=value`; empty = it is not there.
+/// The value of a key in `key=value&key=value`; empty = missing.
 std::string_view value_of(std::string_view arguments, std::string_view key) {
   while (!arguments.empty()) {
     const std::string_view one = arguments.substr(0, arguments.find('&'));
