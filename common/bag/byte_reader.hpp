@@ -1,4 +1,4 @@
-// Values from the bytes of a file, each checked against what is left.
+// Reads values from the bytes of a file; each read is checked against the remaining bytes.
 #pragma once
 
 #include <concepts>
@@ -13,9 +13,9 @@ namespace understory::bag {
 /// The bytes end in the middle of a value.
 class CutOff : public std::runtime_error {
  public:
-  /// `at`: where the value begins.
+  /// `at`: offset of the value.
   explicit CutOff(std::size_t at) : std::runtime_error("cut off"), at_(at) {}
-  /// From the beginning of the bytes.
+  /// Offset of the value from the first byte.
   std::size_t at() const { return at_; }
 
  private:
@@ -28,7 +28,7 @@ class ByteReader {
   /// The bytes must outlive it.
   explicit ByteReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
-  /// An integer.
+  /// Reads an integer.
   template <std::integral T>
   T number() {
     T value{};
@@ -43,7 +43,7 @@ class ByteReader {
     at_ += count;
     return taken;
   }
-  /// Bytes behind their length of 32 bits, as text.
+  /// Reads text after its length of 32 bits.
   std::string_view text() {
     const std::size_t begin = at_;
     const auto length = number<std::uint32_t>();
@@ -54,7 +54,7 @@ class ByteReader {
 
   /// How many bytes were read.
   std::size_t at() const { return at_; }
-  /// How many are left.
+  /// Number of remaining bytes.
   std::size_t left() const { return bytes_.size() - at_; }
 
  private:

@@ -29,7 +29,7 @@ void ChunkOrder::load(Open& open) {
 }
 
 void ChunkOrder::make_room() {
-  // The first one is due: it stays.
+  // The first one is due: keep it.
   for (auto at = open_.rbegin(); bytes_ > most_bytes_ && at != std::prev(open_.rend()); ++at) {
     Open& open = at->second;
     if (!open.is_loaded) continue;
@@ -74,7 +74,7 @@ std::optional<ChunkOrder::Item> ChunkOrder::next() {
     make_room();
   }
 
-  // A file that changed meanwhile.
+  // The file has changed meanwhile.
   if (open.next >= open.chunk.entries.size()) return next();
   const ChunkEntry entry = open.chunk.entries[open.next++];
   const auto data =

@@ -15,9 +15,9 @@ namespace understory::bag {
 /// One message in an unpacked chunk.
 struct ChunkEntry {
   std::int64_t time_ns = 0;
-  std::uint32_t channel = 0;  ///< As the file numbers its channels or connections.
-  std::uint32_t offset = 0;   ///< Of the message's data in the chunk.
-  std::uint32_t size = 0;     ///< Of the message's data.
+  std::uint32_t channel = 0;  ///< Number of the channel or connection in the file.
+  std::uint32_t offset = 0;   ///< Offset of the message's data in the chunk.
+  std::uint32_t size = 0;     ///< Size of the message's data.
 };
 
 /// A chunk in memory.
@@ -42,7 +42,7 @@ class ChunkOrder {
   /// Which entries are wanted, by channel.
   using IsWanted = std::function<bool(std::uint32_t channel)>;
 
-  /// `spans`: of every chunk, by its number.
+  /// `spans`: time span of every chunk, by its number.
   ChunkOrder(std::vector<ChunkSpan> spans, Load load, IsWanted is_wanted, std::size_t most_bytes);
 
   /// A message and its bytes, which are valid until the next call.
@@ -50,17 +50,17 @@ class ChunkOrder {
     ChunkEntry entry;
     std::span<const std::uint8_t> data;
   };
-  /// The next message in order of time; of one time, in order of chunks and of their entries.
-  /// Throws what `load` throws.
+  /// The next message in order of time; messages of equal time in order of chunks and entries.
+  /// Passes on exceptions of `load`.
   std::optional<Item> next();
-  /// How often a chunk was loaded.
+  /// Number of loads of chunks.
   std::uint64_t loads() const { return loads_; }
 
  private:
-  /// A chunk that has messages to give.
+  /// A chunk with remaining messages.
   struct Open {
     std::size_t number = 0;
-    std::size_t next = 0;  ///< Entry.
+    std::size_t next = 0;  ///< Index of the next entry.
     LoadedChunk chunk;     ///< Its bytes are empty while it is not loaded.
     bool is_loaded = true;
   };
@@ -75,9 +75,9 @@ class ChunkOrder {
   IsWanted is_wanted_;
   std::size_t most_bytes_;
   std::vector<std::size_t> order_;  ///< Chunks by their earliest time.
-  std::size_t next_chunk_ = 0;      ///< Place in order_.
+  std::size_t next_chunk_ = 0;      ///< Index in order_.
   std::map<Key, Open> open_;
-  std::optional<Open> given_;  ///< Exhausted, but its last message was just given.
+  std::optional<Open> given_;  ///< Exhausted chunk whose last message was just returned.
   std::size_t bytes_ = 0;
   std::uint64_t loads_ = 0;
 };

@@ -125,7 +125,7 @@ void ChunkedBag::rewind(const std::vector<std::size_t>& wanted) {
     const auto topic = topic_of_.find(channel);
     return topic != topic_of_.end() && (wanted_.empty() || wanted_.contains(topic->second));
   };
-  // A chunk without any wanted message is not even unpacked.
+  // A chunk without selected messages is not unpacked.
   std::vector<std::size_t> numbers;
   std::vector<ChunkSpan> spans;
   for (std::size_t i = 0; i < places_.size(); ++i) {

@@ -32,22 +32,22 @@ constexpr std::array<std::string_view, 4> kIntensityNames{"reflectivity", "inten
                                                           "intensities"};
 
 constexpr double kShortestRevolution_s = 0.002;
-/// A cloud may be a packet alone.
+/// A cloud may be a single packet.
 constexpr double kShortestPacket_s = 0.0005;
 constexpr double kLongestRevolution_s = 1.5;
 constexpr double kLongestSweep_s = 5.0;
-/// A clock farther from the stamp's is another one.
+/// A clock with a larger difference from the stamp's is another clock.
 constexpr double kSameClock_s = 10.0;
-/// Times from the stamp are never this long; times of a clock are.
+/// Times relative to the stamp are shorter; absolute times are longer.
 constexpr double kRelative_s = 5.0;
 constexpr std::uint32_t kMostRings = 256;
-/// A reading at the end of the range may lie so much behind it.
+/// Noise may place a reading at full range beyond it by this factor.
 constexpr double kNoise = 1.01;
-/// Times in coarser steps than this share of the sweep are none.
+/// Times with steps coarser than this share of the sweep are ignored.
 constexpr double kFinestShare = 0.01;
 
-/// Unit [s] of times that lie `spread` apart: nanoseconds of integers, seconds of floats, unless a
-/// sweep cannot last so long and another unit gives it a possible length.
+/// Unit [s] of times with this `spread`: nanoseconds for integers, seconds for floats, unless only
+/// another unit gives a possible duration of a sweep.
 double time_unit(double spread, FieldType type) {
   const bool is_float = type == FieldType::kFloat32 || type == FieldType::kFloat64;
   const double usual = is_float ? 1.0 : 1e-9;
@@ -63,20 +63,20 @@ double time_unit(double spread, FieldType type) {
 
 }  // namespace
 
-/// A point as its fields have it.
+/// Raw field values of a point.
 struct CloudDecoder::RawPoint {
   Eigen::Vector3f position_m;
-  double time = 0.0;       ///< In the field's unit.
-  std::int64_t ticks = 0;  ///< The same where the field has integers: nanoseconds of a clock
-                           ///< since 1970 do not fit into a double.
+  double time = 0.0;  ///< Time in the field's unit.
+  std::int64_t ticks =
+      0;  ///< The same for an integer field: nanoseconds since 1970 do not fit into a double.
   std::uint32_t ring = 0;
   double intensity = 0.0;
 };
 
-/// Where a point's ring is.
+/// Source of a point's ring.
 enum class CloudDecoder::RingPlace : std::uint8_t { kNone, kField, kRow, kColumn };
 
-/// Which fields are which.
+/// The fields by meaning.
 struct CloudDecoder::Layout {
   FieldReader x, y, z;
   std::optional<FieldReader> time, ring, intensity;
@@ -104,8 +104,8 @@ CloudDecoder::Layout CloudDecoder::layout_of(const PointCloud& cloud) const {
   layout.time = find_field(cloud, kTimeNames);
   layout.ring = find_field(cloud, kRingNames);
   layout.intensity = find_field(cloud, kIntensityNames);
-  // Of an organised cloud one dimension is the sensor's beams: there are fewer of them than of
-  // firings. Ouster has a beam in each row, RoboSense in each column.
+  // One dimension of an organised cloud is the sensor's beams, which are fewer than its firings.
+  // Ouster has one beam per row, RoboSense one per column.
   const std::uint32_t fewer = std::min(cloud.height, cloud.width);
   if (layout.ring) {
     layout.ring_place = RingPlace::kField;
@@ -156,7 +156,7 @@ model::PointSweep CloudDecoder::decode(const PointCloud& cloud) {
                   has_found || layout.ring_place != RingPlace::kNone);
 }
 
-/// Whether rings were found in a cloud that has none.
+/// Searches rings in a cloud without a ring field; false where none were found.
 bool CloudDecoder::take_found_rings(std::vector<RawPoint>& points) {
   std::vector<Eigen::Vector3f> positions_m;
   positions_m.reserve(points.size());
@@ -198,14 +198,14 @@ model::PointSweep CloudDecoder::decode(const LivoxCloud& cloud) {
   return sweep_of(std::move(points), cloud.header, true, true);
 }
 
-/// From the first cloud whose points have different times.
+/// Decided by the first cloud whose points have different times.
 void CloudDecoder::decide_time(const std::vector<RawPoint>& points, std::int64_t stamp_ns,
                                FieldType type) {
   if (unit_s_ || points.empty()) return;
   const auto [first, last] = std::ranges::minmax(points, {}, &RawPoint::time);
   const double spread = last.time - first.time;
   if (spread <= 0.0) return;
-  // Seconds since 1970 do not fit into a float: what it holds are steps of two minutes.
+  // Seconds since 1970 do not fit into a float: its steps are then two minutes.
   constexpr double kRelativeStep = 1.2e-7;
   const double step = kRelativeStep * std::max(std::abs(first.time), std::abs(last.time));
   is_too_coarse_ = type == FieldType::kFloat32 && step > kFinestShare * spread;
@@ -214,7 +214,8 @@ void CloudDecoder::decide_time(const std::vector<RawPoint>& points, std::int64_t
   unit_s_ = options_.time_unit_s ? *options_.time_unit_s : time_unit(spread, type);
   const double middle_s = 0.5 * (first.time + last.time) * *unit_s_;
   const double from_stamp_s = middle_s - 1e-9 * static_cast<double>(stamp_ns);
-  // Of a short drive's own clock only doubles have the digits for a time near the stamp.
+  // On a clock that starts near 0, only doubles have enough digits for absolute times near the
+  // stamp.
   is_absolute_ = std::abs(middle_s) > kRelative_s ||
                  (type == FieldType::kFloat64 && std::abs(from_stamp_s) < std::abs(middle_s));
   is_own_clock_ = is_absolute_ && std::abs(from_stamp_s) > kSameClock_s;
@@ -224,11 +225,11 @@ void CloudDecoder::decide_intensity(const std::vector<RawPoint>& points, bool is
   if (intensity_factor_ || points.empty()) return;
   const auto brightest = std::ranges::max(points, {}, &RawPoint::intensity).intensity;
   if (!is_integer && brightest <= 0.0) return;
-  // Floats up to 1 are shares.
+  // Floats up to 1 are fractions.
   intensity_factor_ = !is_integer && brightest <= 1.0 ? 255.0 : 1.0;
 }
 
-/// From the first cloud with two rings: each looks in one direction, up or down.
+/// Decided by the first cloud with two rings, from the elevation of each ring.
 void CloudDecoder::decide_rings(const std::vector<RawPoint>& points) {
   if (ring_order_ != RingOrder::kUnknown) return;
   std::array<double, kMostRings> sum{};
@@ -274,7 +275,7 @@ std::uint16_t CloudDecoder::ring_of(std::uint32_t ring) const {
   return static_cast<std::uint16_t>(ring);
 }
 
-/// Nanoseconds from the stamp, in integers: absolute times have more digits than a double.
+/// Nanoseconds from the stamp, in integers: absolute times need more digits than a double has.
 std::vector<std::int64_t> CloudDecoder::times_from_stamp(const std::vector<RawPoint>& points,
                                                          std::int64_t stamp_ns) const {
   constexpr double kMost_ns = 4e18;
@@ -298,7 +299,7 @@ std::vector<std::int64_t> CloudDecoder::times_from_stamp(const std::vector<RawPo
   return times;
 }
 
-/// utime and each point's time from it.
+/// Sets utime and each point's time relative to it.
 void CloudDecoder::set_times(const std::vector<RawPoint>& points, const Header& header,
                              model::PointSweep& sweep) const {
   std::vector<std::int64_t> times(points.size(), 0);
@@ -309,7 +310,8 @@ void CloudDecoder::set_times(const std::vector<RawPoint>& points, const Header& 
   if (duration_s > kLongestSweep_s)
     throw io::DataError(fmt::format("the points' times lie {:.3f} s apart", duration_s));
 
-  // The stamp stands where it is the begin; else the first point does.
+  // The sweep begins at the stamp if that is not later than the first point, else at the first
+  // point.
   const bool is_stamp_first =
       is_own_clock_ || (first_ns >= 0 && 1e-9 * static_cast<double>(first_ns) < kRelative_s);
   const std::int64_t begin_ns = header.stamp_ns + (is_stamp_first ? 0 : first_ns);
@@ -330,7 +332,7 @@ model::PointSweep CloudDecoder::sweep_of(std::vector<RawPoint> points, const Hea
   if (has_rings) decide_rings(points);
   model::PointSweep sweep;
   sweep.revolution = revolutions_++;
-  // A field that never changes holds no times.
+  // A constant field has no times.
   sweep.has_times = has_times && unit_s_.has_value();
   sweep.max_range_m = options_.max_range_m;
 

@@ -1,4 +1,4 @@
-// Clouds of lasers as sweeps: where each driver keeps the time, the ring and the intensity.
+// Converts laser clouds to sweeps; finds the fields of time, ring and intensity of each driver.
 #pragma once
 
 #include <optional>
@@ -11,40 +11,41 @@
 
 namespace understory::bag {
 
-/// What a person states about a cloud.
+/// Properties of a cloud that the user states.
 struct CloudOptions {
-  /// Of the field with the points' times [s]; none = found from the field and the data.
+  /// Unit of the field with the points' times [s]; none = derived from the field and the data.
   std::optional<double> time_unit_s;
-  /// Beyond it nothing is seen [m]: points more than 1 % beyond are left out.
+  /// Range of the sensor [m]: points more than 1 % beyond it are left out.
   double max_range_m = 120.0;
 };
 
-/// Clouds in, sweeps in frame `sensor` out. What the first clouds show of units and of the order of
-/// rings holds for all that follow.
+/// Input: clouds; output: sweeps in frame `sensor`. Units and the order of rings are derived from
+/// the first clouds and apply to all later ones.
 ///
 /// Times: the field `t`, `time`, `timestamp`, `time_stamp`, `time_offset`, `time_offset_ns`,
-/// `offset_time`, ...: integers are nanoseconds, floats seconds, unless a sweep cannot last so long
-/// and another unit gives it 2 ms to 1.5 s. Numbers that are not near zero are absolute, by
-/// whatever clock; where that is not the stamp's (more than 10 s apart), the first point is at the
-/// stamp. A field that is always the same holds no times. Rings: `ring`, `line`, `channel`,
-/// `laser_id`, `ring_id`, or the row of an organised cloud; renumbered so that 0 is the lowest;
-/// where there are none, find_rings() looks for them in each cloud.
-/// Intensity: `reflectivity`, else `intensity`, `i`; 0 .. 255.
+/// `offset_time`, ...: integers are nanoseconds, floats seconds, unless the sweep would be too long
+/// and another unit gives 2 ms to 1.5 s. Numbers far from zero are absolute times of some clock; if
+/// it differs from the stamp's clock by more than 10 s, the first point is at the stamp. A constant
+/// field has no times. Rings: `ring`, `line`, `channel`, `laser_id`, `ring_id`, or the row of an
+/// organised cloud; renumbered so that 0 is the lowest; without these, find_rings() searches rings
+/// in each cloud. Intensity: `reflectivity`, else `intensity`, `i`; 0 .. 255.
 class CloudDecoder {
  public:
-  /// Nothing stated: everything from the data.
+  /// Default options: everything is derived from the data.
   explicit CloudDecoder(const CloudOptions& options = {}) : options_(options) {}
 
   /// Points that are not finite or at the origin (no return) are left out. utime: the stamp, or the
-  /// first point where that is earlier. Throws io::DataError where fields and data do not fit.
+  /// time of the first point if that is earlier. Throws io::DataError where fields and data do not
+  /// match.
   model::PointSweep decode(const PointCloud& cloud);
-  /// The same of Livox's own message.
+  /// The same for Livox's own message.
   model::PointSweep decode(const LivoxCloud& cloud);
-  /// What was found, for people: "times: t (uint32, 1e-09 s from the stamp); rings: ring ...".
+  /// Description of the fields found, for people: "times: t (uint32, 1e-09 s from the stamp);
+  /// rings: ring ...".
   std::string description() const;
 
  private:
-  /// How the rings of the sensor are counted.
+  /// Order of the sensor's ring numbers.
   enum class RingOrder : std::uint8_t { kUnknown, kUpwards, kDownwards, kTable };
   enum class RingPlace : std::uint8_t;
   struct RawPoint;
@@ -65,14 +66,14 @@ class CloudDecoder {
                              bool has_rings);
 
   CloudOptions options_;
-  std::optional<double> unit_s_;  ///< Of the points' times, once decided.
-  bool is_absolute_ = false;      ///< Times are those of a clock, not from the stamp.
-  bool is_own_clock_ = false;     ///< Which is not the stamp's.
+  std::optional<double> unit_s_;  ///< Unit of the points' times, when known.
+  bool is_absolute_ = false;      ///< Times are absolute, not relative to the stamp.
+  bool is_own_clock_ = false;     ///< The clock differs from the stamp's clock.
   bool is_too_coarse_ = false;    ///< The field's type cannot hold times of points.
   RingOrder ring_order_ = RingOrder::kUnknown;
   std::uint32_t rings_ = 0;                 ///< Number of beams, as far as known.
-  std::vector<std::uint16_t> ring_table_;   ///< By the sensor's number.
-  std::optional<double> intensity_factor_;  ///< To 0 .. 255.
+  std::vector<std::uint16_t> ring_table_;   ///< Ring by the sensor's number.
+  std::optional<double> intensity_factor_;  ///< Factor to 0 .. 255.
   std::string time_text_ = "none";
   std::string ring_text_ = "none";
   std::uint64_t revolutions_ = 0;

@@ -13,7 +13,7 @@
 
 namespace understory::bag {
 
-/// Types of a field: those of PointField, and two that PCD files have besides.
+/// Types of a field: those of PointField, and two more of PCD files.
 enum class FieldType : std::uint8_t {
   kInt8 = 1,
   kUint8 = 2,
@@ -27,31 +27,31 @@ enum class FieldType : std::uint8_t {
   kUint64 = 10,
 };
 
-/// Reads one field of a point. It lies within the point: find_field() has checked it.
+/// Reads one field of a point. find_field() has checked that the field lies within the point.
 class FieldReader {
  public:
-  /// A field of points in this byte order.
+  /// Reads this field, in this byte order.
   FieldReader(const PointField& field, bool is_big_endian)
       : field_(field),
         is_big_endian_(is_big_endian),
         is_plain_float_(type() == FieldType::kFloat32 &&
                         is_big_endian == (std::endian::native == std::endian::big)) {}
 
-  /// The number of the point that begins here.
+  /// The field's value of the point that begins here.
   double value(const std::uint8_t* point) const {
     if (!is_plain_float_) return converted(point);
-    // Most fields of most clouds: without a call.
+    // The most frequent case, without a call.
     float plain = 0.0F;
     std::memcpy(&plain, point + field_.offset, sizeof plain);
     return static_cast<double>(plain);
   }
-  /// The same where the field has integers; of floats 0.
+  /// The same for an integer field; 0 for floats.
   std::int64_t integer(const std::uint8_t* point) const;
-  /// Whether the field's type is one of integers.
+  /// Whether the field has an integer type.
   bool is_integer() const { return type() != FieldType::kFloat32 && type() != FieldType::kFloat64; }
   FieldType type() const { return static_cast<FieldType>(field_.type); }
-  std::string_view name() const { return field_.name; }  ///< Of the field.
-  std::string type_name() const;                         ///< "float32".
+  std::string_view name() const { return field_.name; }  ///< Name of the field.
+  std::string type_name() const;                         ///< Type as text: "float32".
 
  private:
   double converted(const std::uint8_t* point) const;
@@ -61,12 +61,12 @@ class FieldReader {
   bool is_plain_float_;  ///< float32 in the byte order of this computer.
 };
 
-/// The first of these names that the cloud has. Throws io::DataError where its field does not lie
-/// within a point or has a type that there is not.
+/// The first of these names that the cloud has. Throws io::DataError where the field does not lie
+/// within a point or has an unknown type.
 std::optional<FieldReader> find_field(const PointCloud& cloud,
                                       std::span<const std::string_view> names);
 
-/// Where the points are.
+/// Layout of the points.
 struct CloudRows {
   std::uint32_t rows = 0;
   std::uint32_t columns = 0;
@@ -75,7 +75,7 @@ struct CloudRows {
 
   /// Number of points.
   std::uint64_t points() const { return std::uint64_t{rows} * columns; }
-  /// A point of data that rows_of() was given.
+  /// Address of a point in the data that rows_of() checked.
   const std::uint8_t* at(std::span<const std::uint8_t> data, std::uint32_t row,
                          std::uint32_t column) const {
     return data.data() + row * row_bytes + column * point_bytes;
@@ -83,7 +83,7 @@ struct CloudRows {
 };
 
 /// Height, width and steps, compared with the data. A row step that is too small for its points is
-/// not believed. Throws io::DataError where the data is too short.
+/// ignored. Throws io::DataError where the data is too short.
 CloudRows rows_of(const PointCloud& cloud);
 
 /// The name of a PointField's type: "float32".

@@ -16,8 +16,8 @@
 namespace understory::bag {
 namespace {
 
-/// Seconds that a number in a file's name means: those since 1970 have ten digits, and three more
-/// for each finer unit.
+/// Seconds of a number in a file's name: seconds since 1970 have ten digits, each finer unit three
+/// more.
 double seconds_of(double number) {
   if (number > 1e17) return number * 1e-9;
   if (number > 1e14) return number * 1e-6;
@@ -33,7 +33,7 @@ bool is_counting(const std::vector<double>& numbers) {
   return numbers.size() > 1 && numbers.front() >= 0.0 && numbers.front() < 1e6;
 }
 
-/// The number that a name is; none of "scan_000001".
+/// The name as a number; none for "scan_000001".
 std::optional<double> number_of(const CloudEntry& file) {
   const std::string stem = file.path.stem().string();
   double number = 0.0;
@@ -43,7 +43,7 @@ std::optional<double> number_of(const CloudEntry& file) {
   return number;
 }
 
-/// Names that count are numbers of periods; of other names the order alone counts.
+/// Counting names are numbers of periods; of other names only the order is used.
 std::vector<double> seconds_by_rate(const std::vector<double>& numbers, double rate_hz) {
   std::vector<double> seconds;
   for (std::size_t i = 0; i < numbers.size(); ++i)
@@ -81,7 +81,7 @@ std::vector<double> seconds_of_names(std::vector<CloudEntry>& files,
   return numbers;
 }
 
-/// In the order of their names; of one kind.
+/// The cloud files in order of names; all of one kind.
 std::vector<CloudEntry> cloud_files(const std::filesystem::path& folder) {
   std::map<std::string, std::vector<CloudEntry>> by_kind;
   std::error_code failed;
@@ -101,8 +101,8 @@ std::vector<CloudEntry> cloud_files(const std::filesystem::path& folder) {
   return files;
 }
 
-/// KITTI has the times in the folder above that of the clouds: times.txt, raw drives
-/// timestamps.txt.
+/// KITTI has the times in the parent of the clouds' folder: times.txt, or timestamps.txt in raw
+/// drives.
 std::optional<std::filesystem::path> stamps_beside(const std::filesystem::path& folder) {
   std::error_code failed;
   const std::filesystem::path above = std::filesystem::absolute(folder / "..").lexically_normal();
@@ -127,8 +127,8 @@ std::vector<double> seconds_in(const std::filesystem::path& stamps) {
   return seconds;
 }
 
-/// The stamp of each file. A drive of KITTI may be cut, or lack files, and its stamps be whole:
-/// names are then numbers of lines, from 0.
+/// The stamp of each file. If a KITTI drive lacks files but has all stamps, names are line numbers
+/// from 0.
 std::vector<double> seconds_of_files(const std::vector<CloudEntry>& files,
                                      const std::vector<double>& stamps) {
   if (files.size() == stamps.size()) return stamps;

@@ -9,10 +9,10 @@
 
 namespace understory::bag {
 
-/// Joins files in order of time; topics of the same name, type and encoding are one.
+/// Joins files in order of time; topics of equal name, type and encoding are merged.
 class JoinedBag : public Bag {
  public:
-  /// At least one part; `folder` names them in remarks.
+  /// At least one part; `folder` is their name in remarks.
   JoinedBag(std::vector<std::unique_ptr<Bag>> parts, const std::string& folder);
 
   const std::vector<Topic>& topics() const override { return topics_; }
@@ -24,10 +24,10 @@ class JoinedBag : public Bag {
  private:
   std::vector<std::unique_ptr<Bag>> parts_;
   std::vector<Topic> topics_;
-  std::vector<std::vector<std::size_t>> topic_of_;  ///< By part and its topic.
+  std::vector<std::vector<std::size_t>> topic_of_;  ///< Topic by part and the part's topic.
   std::vector<std::optional<Message>> heads_;       ///< The next message of each part.
-  std::optional<std::size_t> given_;                ///< The part of the message given last.
-  std::vector<bool> is_wanted_;                     ///< By part: it has a wanted topic.
+  std::optional<std::size_t> given_;                ///< The part of the message returned last.
+  std::vector<bool> is_wanted_;                     ///< By part: whether it has a selected topic.
   std::string remark_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 using mcap::Opcode;
 
-/// Of a record that is neither a chunk nor a message nor an attachment.
+/// Largest record other than chunks, messages and attachments [bytes].
 constexpr std::uint64_t kLargestContent = 64U << 20U;
 /// Messages outside of chunks are read in runs of about this size.
 constexpr std::uint64_t kRunBytes = 4U << 20U;
@@ -25,7 +25,7 @@ std::int64_t read_time(ByteReader& reader) {
   return bounded_time(static_cast<std::int64_t>(reader.number<std::uint64_t>()));
 }
 
-/// A channel with the name of its type.
+/// Reads a channel with the name of its type.
 ChannelInfo channel_of(ByteReader& content, const std::map<std::uint16_t, std::string>& types) {
   const auto schema = content.number<std::uint16_t>();
   ChannelInfo channel;
@@ -36,7 +36,7 @@ ChannelInfo channel_of(ByteReader& content, const std::map<std::uint16_t, std::s
   return channel;
 }
 
-/// Whether the bytes from here on may be a record: for the end of a file that was cut off.
+/// Whether a record may begin with this byte; for the end of a file that was cut off.
 bool is_opcode(std::uint8_t opcode) { return opcode >= 1 && (opcode <= 0x0F || opcode >= 0x80); }
 
 }  // namespace
@@ -73,7 +73,7 @@ void McapFile::walk() {
         try {
           take_chunk(content, left, left);
         } catch (const CutOff&) {
-          // Not even the chunk's head is whole: nothing of it can be read.
+          // The chunk's header is incomplete: nothing of the chunk is readable.
         }
       }
       return;
@@ -88,7 +88,7 @@ void McapFile::walk() {
   }
 }
 
-/// False behind the last record.
+/// Returns false after the last record.
 bool McapFile::take(std::uint8_t opcode, std::uint64_t offset, std::uint64_t bytes) {
   if (is(opcode, Opcode::kFooter)) return false;
   if (is(opcode, Opcode::kChunk)) {
@@ -115,7 +115,7 @@ void McapFile::take_declaration(std::uint8_t opcode, Bytes content) {
   }
 }
 
-/// `in_file`: bytes of the record that the file has.
+/// `in_file`: bytes of the record that are in the file.
 void McapFile::take_chunk(std::uint64_t offset, std::uint64_t bytes, std::uint64_t in_file) {
   constexpr std::uint64_t kHead = 8 + 8 + 8 + 4;  // times, size, checksum
   constexpr std::uint64_t kLongestName = 64;
@@ -134,7 +134,7 @@ void McapFile::take_chunk(std::uint64_t offset, std::uint64_t bytes, std::uint64
   const std::uint64_t left = in_file - reader.at();
   place.offset = offset + reader.at();
   place.bytes = std::min(records, left);
-  // A chunk that the file has whole holds its records whole.
+  // A chunk that is completely in the file must contain all its records.
   place.is_cut_off = records > left && !remarks_.empty();
   if (records > left && !place.is_cut_off) throw CutOff(0);
   places_.push_back(std::move(place));
@@ -153,7 +153,7 @@ void McapFile::take_index(Bytes content) {
 
 void McapFile::take_statistics(Bytes content) {
   ByteReader reader(content);
-  reader.take(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8);  // counts in all, and the first and last time
+  reader.take(8 + 2 + 4 + 4 + 4 + 4 + 8 + 8);  // total counts, first and last time
   const auto bytes = reader.number<std::uint32_t>();
   constexpr std::uint32_t kEntryBytes = 10;
   for (std::uint32_t i = 0; i < bytes / kEntryBytes; ++i) {
@@ -162,7 +162,7 @@ void McapFile::take_statistics(Bytes content) {
   }
 }
 
-/// A message outside of chunks: neighbours form a run, which is read like a chunk.
+/// A message outside of chunks: adjacent ones form a run, which is read like a chunk.
 void McapFile::take_message(std::uint64_t offset, std::uint64_t bytes) {
   std::array<std::uint8_t, 2 + 4 + 8> head{};
   if (bytes < head.size() + 8 || !read(offset, head)) throw CutOff(0);

@@ -5,8 +5,7 @@
 
 namespace understory::bag {
 
-/// A file, finished or not. It is walked from front to back, record by record; chunks are passed
-/// over where their message indexes list what is in them.
+/// A file, finished or not. It is read record by record; chunks with message indexes are skipped.
 class McapFile : public ChunkedBag {
  public:
   /// Throws io::DataError.
@@ -26,8 +25,8 @@ class McapFile : public ChunkedBag {
   void take_declaration(std::uint8_t opcode, std::span<const std::uint8_t> content);
   std::vector<std::uint8_t> content_at(std::uint64_t offset, std::uint64_t bytes);
 
-  mutable std::map<std::uint16_t, std::string> types_;  ///< By the schema's number.
-  std::uint64_t run_end_ = 0;  ///< End of the last run of messages that are in no chunk.
+  mutable std::map<std::uint16_t, std::string> types_;  ///< Type name by the schema's number.
+  std::uint64_t run_end_ = 0;  ///< End of the last run of messages outside of chunks.
 };
 
 }  // namespace understory::bag

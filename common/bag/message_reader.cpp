@@ -11,7 +11,7 @@ namespace understory::bag {
 namespace {
 
 constexpr std::size_t kCdrHeader = 4;
-/// A message that was packed by itself; a cloud of 10 million points has less.
+/// Largest message that is packed alone [bytes]; a cloud of 10 million points is smaller.
 constexpr std::uint64_t kLargestMessage = 1U << 30U;
 
 }  // namespace
@@ -54,7 +54,7 @@ std::span<const std::uint8_t> MessageReader::take(std::size_t count) {
 std::string MessageReader::text() {
   const auto from = bytes();
   std::string text(from.begin(), from.end());
-  // CDR counts a zero at the end.
+  // CDR includes a terminating zero.
   if (encoding_ == Encoding::kCdr && !text.empty() && text.back() == '\0') text.pop_back();
   return text;
 }

@@ -15,14 +15,14 @@
 namespace understory::bag {
 
 /// Reads a message field by field, in the order of its definition; every length is checked against
-/// the bytes that are left. Throws io::DataError that names what ends, and at which byte.
+/// the remaining bytes. Throws io::DataError with the message and the byte where it ends.
 class MessageReader {
  public:
   /// CDR begins with its own header of four bytes: plain CDR and XCDR2 of final types are read. A
   /// message packed with zstd (rosbag2's compression_mode MESSAGE) is unpacked.
   MessageReader(std::span<const std::uint8_t> data, Encoding encoding);
 
-  /// A number; CDR aligns it to its size.
+  /// Reads a number; CDR aligns it to its size.
   template <class T>
   requires std::integral<T> || std::floating_point<T> T number() {
     align(sizeof(T));
@@ -34,24 +34,24 @@ class MessageReader {
     std::memcpy(&value, bytes.data(), sizeof(T));
     return value;
   }
-  /// Numbers of an array of fixed length, or passed over.
+  /// Reads numbers of an array of fixed length.
   template <class T>
   void skip(std::size_t count) {
     if (count > 0) align(sizeof(T));
     take(count * sizeof(T));
   }
-  /// A string.
+  /// Reads a string.
   std::string text();
-  /// Length of a sequence whose elements have at least so many bytes each.
+  /// Reads the length of a sequence whose elements have at least this many bytes.
   std::size_t count(std::size_t least_bytes);
-  /// A sequence of bytes.
+  /// Reads a sequence of bytes.
   std::span<const std::uint8_t> bytes();
-  /// The next bytes of an array of fixed length.
+  /// Reads an array of bytes of fixed length.
   std::span<const std::uint8_t> take(std::size_t count);
 
-  /// Bytes that are left.
+  /// Number of remaining bytes.
   std::size_t rest() const { return data_.size() - at_; }
-  /// ROS 1 has the field `seq` in its header, and stamps without sign.
+  /// Encoding of the message. ROS 1 has the field `seq` in its header, and stamps without sign.
   Encoding encoding() const { return encoding_; }
 
  private:

@@ -13,7 +13,7 @@ namespace {
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
 std::int64_t read_stamp(MessageReader& reader) {
-  // ROS 2 has a sign for the seconds, ROS 1 has none: the same bits until 2038.
+  // Seconds are signed in ROS 2, unsigned in ROS 1: the same bits until 2038.
   const auto seconds = reader.encoding() == Encoding::kRos1
                            ? std::int64_t{reader.number<std::uint32_t>()}
                            : std::int64_t{reader.number<std::int32_t>()};
@@ -33,13 +33,13 @@ Eigen::Vector3d read_vector(MessageReader& reader) {
   return {x, y, z};
 }
 
-/// None where the numbers are no pose.
+/// None where the numbers are not a valid pose.
 std::optional<Eigen::Isometry3d> read_any_motion(MessageReader& reader) {
   const Eigen::Vector3d position = read_vector(reader);
   const Eigen::Vector3d axis = read_vector(reader);
   Eigen::Quaterniond rotation(reader.number<double>(), axis.x(), axis.y(), axis.z());
   const double norm = rotation.norm();
-  // A quaternion of zeros is what drivers send that know no rotation.
+  // Drivers without a rotation send a quaternion of zeros.
   if (norm == 0.0) rotation = Eigen::Quaterniond::Identity();
   if (!position.allFinite() || !(norm == 0.0 || std::abs(norm - 1.0) < 0.1)) return std::nullopt;
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
@@ -99,7 +99,7 @@ LivoxCloud read_livox_cloud(MessageReader& reader) {
   LivoxCloud cloud;
   cloud.header = read_header(reader);
   cloud.base_ns = reader.number<std::uint64_t>();
-  reader.number<std::uint32_t>();  // number of points: that of the sequence counts
+  reader.number<std::uint32_t>();  // number of points; the length of the sequence is used instead
   reader.take(4);                  // number of the laser, reserved
   constexpr std::size_t kLeastPoint = 19;
   const std::size_t points = reader.count(kLeastPoint);
@@ -185,7 +185,7 @@ NavSatFix read_nav_sat_fix(MessageReader& reader) {
   const double variance = 0.5 * (covariance[0] + covariance[4]);
   if (covariance_kind != 0 && std::isfinite(variance) && variance > 0.0)
     fix.sigma_m = std::sqrt(variance);
-  // Receivers without a position send zeros, some of them with the status of a fix.
+  // Receivers without a position send zeros, some with the status of a fix.
   const bool is_zero = fix.latitude_deg == 0.0 && fix.longitude_deg == 0.0;
   fix.has_fix = status >= 0 && !is_zero && std::abs(fix.latitude_deg) <= 90.0 &&
                 std::abs(fix.longitude_deg) <= 360.0;
@@ -194,11 +194,11 @@ NavSatFix read_nav_sat_fix(MessageReader& reader) {
 
 namespace {
 
-/// How drivers wrote the packets of a scan; the definitions changed under the same name.
+/// Layout of a scan's packets; drivers changed it under the same type name.
 struct ScanLayout {
   bool has_header = true;
-  std::size_t fixed_bytes = 0;  ///< Of a packet's array; 0 = a sequence.
-  bool has_size = true;         ///< How many bytes of it are the packet's stands behind.
+  std::size_t fixed_bytes = 0;  ///< Length of a packet's array; 0 = a sequence.
+  bool has_size = true;         ///< The number of used bytes follows the array.
 };
 
 std::optional<PacketScan> read_scan(MessageReader reader, const ScanLayout& layout) {
@@ -226,8 +226,8 @@ std::optional<PacketScan> read_scan(MessageReader reader, const ScanLayout& layo
   return scan;
 }
 
-/// HesaiLidar_General_ROS and Autoware's pandar_msgs; HesaiLidar_ROS_2.0, older ones for ROS 2
-/// without header.
+/// Layouts of HesaiLidar_General_ROS and Autoware's pandar_msgs, and of HesaiLidar_ROS_2.0; older
+/// versions for ROS 2 have no header.
 std::span<const ScanLayout> layouts_of(const std::string& type) {
   static constexpr std::array kVelodyne{ScanLayout{true, io::kVelodyneDataBytes, false}};
   static constexpr std::array kPandar{ScanLayout{true, 0, true}, ScanLayout{true, 1500, true}};

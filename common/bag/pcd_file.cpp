@@ -40,10 +40,10 @@ struct PcdHeader {
   std::optional<std::uint64_t> width, height, points;
   Eigen::Isometry3d viewpoint = Eigen::Isometry3d::Identity();
   std::string data;     ///< ascii, binary, binary_compressed
-  std::size_t end = 0;  ///< Where the points start.
+  std::size_t end = 0;  ///< Offset of the first point.
 };
 
-/// PointField's number of a type; 0 where there is none.
+/// Number of a type in PointField; 0 = none.
 std::uint8_t field_type(const PcdField& field) {
   struct Known {
     char type;
@@ -155,7 +155,7 @@ PcdHeader parse_header(std::string_view bytes, std::string_view source) {
 }
 
 std::string unpack_lzf(std::string_view packed, std::uint64_t size, std::string_view source) {
-  // LZF makes at most 264 bytes of three: a larger size is wrong, found before allocating.
+  // LZF expands three bytes to at most 264: a larger size is refused before allocating.
   constexpr std::uint64_t kMost = std::numeric_limits<unsigned int>::max();
   if (size > 100 * packed.size() + 100 || size > kMost || packed.size() > kMost)
     refuse(source, "more bytes than LZF can have packed");
@@ -170,7 +170,7 @@ std::string unpack_lzf(std::string_view packed, std::uint64_t size, std::string_
   return out;
 }
 
-/// Points field by field, as they are compressed, to point by point.
+/// Converts compressed data, field by field, to point by point.
 std::vector<std::uint8_t> by_point(const PcdHeader& header, std::uint64_t point_bytes,
                                    std::string_view by_field) {
   std::vector<std::uint8_t> points(by_field.size());
@@ -210,7 +210,7 @@ std::vector<std::uint8_t> points_of(const PcdHeader& header, std::uint64_t point
 
   if (header.data != "binary_compressed")
     refuse(source, fmt::format("DATA {} is not known", header.data));
-  std::array<std::uint32_t, 2> sizes{};  // Packed, unpacked.
+  std::array<std::uint32_t, 2> sizes{};  // Packed and unpacked size.
   if (data.size() < sizeof sizes) refuse(source, "cut off");
   std::memcpy(sizes.data(), data.data(), sizeof sizes);
   if (sizes[1] != size || sizes[0] > data.size() - sizeof sizes)

@@ -20,7 +20,7 @@ struct PlyHeader {
   std::string format;
   std::uint64_t vertices = 0;
   std::vector<TextField> fields;
-  std::size_t end = 0;  ///< Where the vertices start.
+  std::size_t end = 0;  ///< Offset of the first vertex.
 };
 
 [[noreturn]] void refuse_ply(std::string_view source, const std::string& what) {
@@ -52,8 +52,8 @@ TextField vertex_field(const std::string& type, std::string name, std::string_vi
   refuse_ply(source, fmt::format("property {} of a vertex has type {}", name, type));
 }
 
-/// The lines up to end_header. Only what stands before the second element counts: vertices come
-/// first in the file, or it is refused.
+/// Reads the lines up to end_header. Only the first element is used: it must be the vertices, or
+/// the file is refused.
 PlyHeader parse_ply_header(std::string_view bytes, std::string_view source) {
   if (!bytes.starts_with("ply")) refuse_ply(source, "no PLY file");
   PlyHeader header;
@@ -90,7 +90,7 @@ PlyHeader parse_ply_header(std::string_view bytes, std::string_view source) {
   refuse_ply(source, "no line end_header");
 }
 
-/// Points without rows.
+/// A cloud without rows.
 CloudFile unordered(std::span<const TextField> fields, std::uint64_t points) {
   CloudFile file;
   for (const TextField& field : fields) {

@@ -22,9 +22,9 @@ constexpr std::uint8_t kIndexData = 0x04;
 constexpr std::uint8_t kChunk = 0x05;
 constexpr std::uint8_t kChunkInfo = 0x06;
 constexpr std::uint8_t kConnection = 0x07;
-/// Of a record; connections keep their message definition in the data.
+/// Largest header of a record [bytes]; a connection has its message definition in the data.
 constexpr std::uint32_t kLargestHeader = 1U << 20U;
-/// Of the data of records that are no chunk.
+/// Largest data of a record other than a chunk [bytes].
 constexpr std::uint64_t kLargestData = 64U << 20U;
 
 /// The fields "name=value" of a record's header.
@@ -68,17 +68,17 @@ std::int64_t time_ns(std::uint64_t stamp) {
 
 ChannelInfo connection_of(const Fields& header, Bytes data) {
   const Fields fields(data);
-  // The header has the topic under which it was recorded, the data that of the publisher.
+  // The header has the recorded topic, the data has the publisher's topic.
   return {header.text("topic"), plain_type(fields.text("type")), "ros1"};
 }
 
 }  // namespace
 
-/// The head of a record of the file; its data stays there.
+/// Header of a record; the data is not read.
 struct Ros1Bag::Record {
   std::vector<std::uint8_t> header;
-  std::uint64_t offset = 0;  ///< Of the record.
-  std::uint64_t data = 0;    ///< Offset of the data.
+  std::uint64_t offset = 0;  ///< Offset of the record.
+  std::uint64_t data = 0;    ///< Offset of its data.
   std::uint64_t data_bytes = 0;
   bool is_cut_off = false;  ///< The file ends in the data.
 };
@@ -90,7 +90,7 @@ Ros1Bag::Ros1Bag(const std::filesystem::path& path) : ChunkedBag(path) {
   finish_opening();
 }
 
-/// False at the end of the file and where no record can be: the walk ends there.
+/// Returns false at the end of the file and where no record is possible: reading stops there.
 bool Ros1Bag::read_record(std::uint64_t offset, Record& record) {
   record = {};
   record.offset = offset;
@@ -188,7 +188,7 @@ void Ros1Bag::take_chunk(const Record& record) {
   places_.push_back(std::move(place));
 }
 
-/// The times of one connection's messages in the chunk before it.
+/// Reads the times of one connection's messages in the preceding chunk.
 void Ros1Bag::take_index(const Record& record) {
   const Fields fields(record.header);
   const auto id = fields.number<std::uint32_t>("conn");

@@ -1,8 +1,8 @@
 // ROS 1 bags, version 2.0 (http://wiki.ros.org/Bags/Format/2.0).
 //
-// Read here and not with librosbag-storage: that brings 42 packages of ROS's build tools, finds a
-// plugin through ROS's package path before it opens any file, does not open a bag whose recorder
-// died, and of 200 damaged bags two made it crash.
+// This is an own reader, because librosbag-storage needs 42 packages of ROS's build tools and a
+// plugin on ROS's package path, does not open a bag whose recorder died, and crashed on two of 200
+// damaged bags.
 #pragma once
 
 #include "common/bag/chunked_bag.hpp"

@@ -72,7 +72,7 @@ std::vector<std::pair<std::string, Eigen::Isometry3d>> StaticTransforms::ancesto
     const std::string& frame) const {
   std::vector<std::pair<std::string, Eigen::Isometry3d>> chain{
       {frame, Eigen::Isometry3d::Identity()}};
-  // A tree of n links has no longer chain; transforms in a circle do.
+  // A chain in a tree of n links has at most n links; a cycle would be endless.
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const auto link = links_.find(chain.back().first);
     if (link == links_.end()) break;

@@ -1,4 +1,4 @@
-// Where frames lie on a vehicle, from /tf_static, and from what never moves in /tf.
+// Poses of frames on a vehicle, from /tf_static and from constant transforms of /tf.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -12,25 +12,25 @@
 
 namespace understory::bag {
 
-/// A tree of frames that do not move against each other.
+/// A tree of frames that are fixed to each other.
 class StaticTransforms {
  public:
-  /// A transform; a later one of the same child replaces it. One with a position that is no number
-  /// is left out.
+  /// Adds a transform; it replaces an earlier one of the same child. A transform with a NaN
+  /// position is left out.
   void add(const Pose& parent_T_child);
-  /// A transform that is sent again and again (/tf): it counts where it stays the same in all of
-  /// the recording (1 mm, 0.1 mrad) and add() has none of its child.
+  /// Adds a repeated transform (/tf). It is used if it stays constant in the whole recording (1 mm,
+  /// 0.1 mrad) and add() has none of its child.
   void watch(const Pose& parent_T_child);
-  /// Takes the watched ones that did not move among the others; the number of those taken.
+  /// Adds the constant ones of watch() to the tree; returns their number.
   std::size_t take_watched();
-  /// Takes coordinates of `from` to `to`; none where no chain joins them.
+  /// to_T_from; none where no chain connects the two.
   std::optional<Eigen::Isometry3d> find(const std::string& to, const std::string& from) const;
-  /// Whether the tree names it.
+  /// Whether the tree contains the frame.
   bool has(const std::string& frame) const;
   /// All frames.
   std::vector<std::string> frames() const;
-  /// A line for each transform that was left out, and for each frame with two places (1 mm, 0.1
-  /// mrad), of which the later one counts.
+  /// A line for each transform that was left out, and for each frame with two poses (1 mm, 0.1
+  /// mrad); the later one is used.
   std::vector<std::string> remarks() const;
 
  private:
@@ -46,13 +46,13 @@ class StaticTransforms {
     bool has_moved = false;
   };
   static bool is_same(const Link& a, const Link& b);
-  /// Whether the transform can be used; a remark where it cannot.
+  /// Whether the transform is usable; adds a remark if not.
   bool admits(const Pose& parent_T_child);
 
   std::map<std::string, Link> links_;  ///< By child.
   std::map<std::string, Watched> watched_;
   std::set<std::string> unusable_;               ///< Remarks.
-  std::map<std::string, std::string> replaced_;  ///< Remarks by child, of its last change.
+  std::map<std::string, std::string> replaced_;  ///< Remarks by child, on its last change.
 };
 
 }  // namespace understory::bag

@@ -8,14 +8,14 @@
 namespace understory::bag {
 namespace {
 
-/// In which Ouster's packets are decoded; their messages have none.
+/// Frame for Ouster's packets; their messages have none.
 constexpr const char* kOusterFrame = "os_sensor";
 constexpr std::uint64_t kCloudsLookedInto = 3;
 constexpr std::uint64_t kForcesLookedAt = 100;
-/// Differences of clocks that are kept: of more messages every second one is dropped, and so on.
+/// Largest number of stored clock differences: beyond it every second one is dropped, repeatedly.
 constexpr std::size_t kMostDifferences = 4096;
 
-/// Differences of stamp and reception, thinned evenly.
+/// Differences between stamp and reception time, thinned evenly.
 class Differences {
  public:
   void add(std::int64_t difference_ns) {
@@ -41,7 +41,7 @@ class Differences {
 
 bool is_static(const Topic& topic) { return topic.name.ends_with("tf_static"); }
 
-/// What is gathered of one topic beside its survey.
+/// Intermediate values of one topic beside its survey.
 struct Gathered {
   Differences differences;
   CloudDecoder decoder;

@@ -1,4 +1,4 @@
-// What a bag holds: rates, frames, clocks, static transforms.
+// Contents of a bag: rates, frames, clocks, static transforms.
 #pragma once
 
 #include <functional>
@@ -12,47 +12,47 @@
 
 namespace understory::bag {
 
-/// What the messages of a type can become.
+/// Use of a type's messages.
 enum class Role : std::uint8_t {
   kNone,
   kCloud,       ///< PointCloud2, Livox CustomMsg, packets of a laser.
   kScan,        ///< LaserScan.
   kImu,         ///< Imu, packets of an Ouster's.
-  kOdometry,    ///< Odometry; also a pose.
-  kTwist,       ///< A velocity alone.
+  kOdometry,    ///< Odometry; usable as a pose too.
+  kTwist,       ///< Velocity only.
   kGnss,        ///< NavSatFix.
-  kPose,        ///< A reference of the pose.
-  kTransforms,  ///< Transforms, static ones and others.
+  kPose,        ///< Reference poses.
+  kTransforms,  ///< Static and other transforms.
 };
 /// The role of a topic; kNone of types and encodings that are not read.
 Role role_of(const Topic& topic);
 
-/// What was found in the messages of one topic.
+/// Summary of the messages of one topic.
 struct TopicSurvey {
   std::uint64_t messages = 0;
-  std::int64_t first_ns = 0;  ///< Received.
+  std::int64_t first_ns = 0;  ///< Reception time of the first message.
   std::int64_t last_ns = 0;
-  std::string frame;                    ///< Of the first header.
-  double stamp_minus_received_s = 0.0;  ///< Median, of those that have a stamp.
-  std::uint64_t without_stamp = 0;      ///< Messages; packets may have none.
-  std::string cloud;                    ///< CloudDecoder::description(), of clouds.
-  /// Mean of an IMU's first 100 messages, in the unit that it has.
+  std::string frame;                    ///< Frame in the first header.
+  double stamp_minus_received_s = 0.0;  ///< Median over messages with a stamp.
+  std::uint64_t without_stamp = 0;      ///< Messages without a stamp; packets may have none.
+  std::string cloud;                    ///< For clouds: CloudDecoder::description().
+  /// Mean of an IMU's first 100 messages, in its own unit.
   Eigen::Vector3d force_mps2 = Eigen::Vector3d::Zero();
-  std::string fault;  ///< Of the first message that cannot be read; empty = none.
+  std::string fault;  ///< Fault of the first unreadable message; empty = none.
 
   /// Messages per second; 0 where there are fewer than two.
   double rate_hz() const;
 };
 
-/// What was found in all topics that have a role.
+/// Summary of all topics with a role.
 struct Survey {
   std::vector<TopicSurvey> topics;  ///< In the order of Bag::topics().
-  StaticTransforms transforms;      ///< Of .../tf_static, and those of /tf that do not move.
+  StaticTransforms transforms;      ///< From .../tf_static, and constant ones from /tf.
 };
 
-/// Reads the messages of all topics that have a role, their headers alone but for the first clouds.
-/// `progress` gets the messages read so far. Throws io::DataError where the container is damaged;
-/// messages that cannot be read are noted.
+/// Reads the messages of all topics with a role: only their headers, and the first clouds.
+/// `progress` gets the number of messages read so far. Throws io::DataError where the container is
+/// damaged; unreadable messages are noted in `fault`.
 Survey survey(Bag& bag, const CloudOptions& options,
               const std::function<void(std::uint64_t)>& progress = {});
 

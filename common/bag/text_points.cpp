@@ -26,7 +26,7 @@ class Words {
     at_ = std::min(text_.find_first_of(kSpace, begin), text_.size());
     return text_.substr(begin, at_ - begin);
   }
-  std::size_t at() const { return at_; }  ///< The byte behind the last one.
+  std::size_t at() const { return at_; }  ///< Offset after the last word.
 
  private:
   std::string_view text_;
@@ -45,7 +45,7 @@ template <class T>
 bool put_number(std::string_view word, std::uint8_t* at) {
   auto value = number_in<T>(word);
   if constexpr (std::is_integral_v<T>) {
-    // Some write whole numbers as 3.000.
+    // Some programs write whole numbers as 3.000.
     const auto real = value ? std::nullopt : number_in<double>(word);
     constexpr double kExact = 9e15;  // A double holds every whole number up to here.
     constexpr auto kMost = std::min(kExact, static_cast<double>(std::numeric_limits<T>::max()));
@@ -58,7 +58,7 @@ bool put_number(std::string_view word, std::uint8_t* at) {
   return true;
 }
 
-/// One number of a text in its field's type.
+/// Stores one number of the text in its field's type.
 bool put_word(std::string_view word, FieldType type, std::uint8_t* at) {
   switch (type) {
     case FieldType::kInt8:
@@ -95,7 +95,7 @@ std::vector<std::uint8_t> points_of_text(std::span<const TextField> fields, std:
     numbers += field.count;
     point_bytes += std::uint64_t{field.count} * field.bytes;
   }
-  // A number and what parts it from the next one are two bytes: found before allocating.
+  // A number and its separator need two bytes: refuse before allocating.
   if (points * numbers > text.size() / 2 + 1)
     throw io::DataError(
         fmt::format("{}: {} bytes of text for {} points", source, text.size(), points));

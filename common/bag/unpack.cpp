@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kPiece = 256 * 1024;
 using Packed = std::span<const std::uint8_t>;
 
-/// What a step of unpacking did.
+/// Result of one step of unpacking.
 struct Step {
   std::size_t read = 0;
   std::size_t written = 0;
@@ -25,7 +25,7 @@ struct Step {
   const char* fault = nullptr;
 };
 
-/// Collects pieces; `step` unpacks from what is left into a piece.
+/// Collects pieces; `step` unpacks from the remaining bytes into a piece.
 template <class DoStep>
 Unpacked collect(Packed packed, std::uint64_t size, DoStep step) {
   Unpacked out;
@@ -59,7 +59,7 @@ Unpacked collect(Packed packed, std::uint64_t size, DoStep step) {
 Unpacked from_zstd(Packed packed, std::uint64_t size) {
   const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(),
                                                                         ZSTD_freeDCtx);
-  // Frames that want a window above 128 MiB are refused by default.
+  // Frames with a window above 128 MiB are refused by default.
   return collect(packed, size, [&](Packed from, std::span<std::uint8_t> to) {
     ZSTD_inBuffer in{from.data(), from.size(), 0};
     ZSTD_outBuffer out{to.data(), to.size(), 0};
