@@ -15,14 +15,14 @@ DecayRate::DecayRate(double rate_per_s, double weight) : mean_per_s_(rate_per_s)
   if (weight <= 0.0 || rate_per_s <= 0.0) return;
   went_ = weight;
   exposure_s_ = weight / rate_per_s;
-  mean_per_s_ = went_ / exposure_s_;  // as restore() gives it, to the bit
+  mean_per_s_ = went_ / exposure_s_;  // equal to the result of restore(), to the bit
 }
 
 double DecayRate::sigma_per_s() const { return went_ > 0.0 ? std::sqrt(went_) / exposure_s_ : 0.0; }
 
 void DecayRate::replace(const DecayEvidence& was, const DecayEvidence& is) {
   if (went_ <= 0.0) return;
-  // Who went was there for about half of one interval, which is left out.
+  // A removed point existed for about half of one interval; this time is neglected.
   const auto exposure_s = [](const DecayEvidence& one) {
     return (1.0 - static_cast<double>(one.went)) * static_cast<double>(one.since_s);
   };

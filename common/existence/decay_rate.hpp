@@ -1,37 +1,37 @@
-// The rate at which points of a map cease to exist, learned from drives that come back.
+// The rate at which points of a map cease to exist, learned from repeated drives.
 #pragma once
 
 namespace understory::existence {
 
-/// What a point adds to the counts since it was last surely seen.
+/// A point's contribution to the counts since it was last surely seen.
 struct DecayEvidence {
-  float went = 0.0F;     ///< Probability that it went since then: 1 - P.
-  float since_s = 0.0F;  ///< How long ago that was.
+  float went = 0.0F;     ///< Probability that it was removed since then: 1 - P.
+  float since_s = 0.0F;  ///< Time since then.
 };
 
-/// Gamma posterior over lambda: points that went, over the time that points were there. A point
-/// that may have gone counts for what it may, until more is known: then what it counted is taken
-/// back (EM, one point at a time, with the posterior of now and not of then).
+/// Gamma posterior over lambda: removed points over the time for which points existed. A point that
+/// may be removed counts with its probability; when more is known, this contribution is replaced
+/// (incremental EM with the present posterior).
 class DecayRate {
  public:
-  /// `weight`: what the start value counts for, in points that went; 0: it stays as it is.
+  /// `weight`: weight of the start value in removed points; 0: the rate is constant.
   DecayRate(double rate_per_s, double weight);
 
-  /// lambda [1/s]: what it is held at, else the posterior's mean.
+  /// lambda [1/s]: the value of hold(), else the posterior's mean.
   double mean_per_s() const { return held_per_s_ > 0.0 ? held_per_s_ : mean_per_s_; }
-  /// 0: at nothing.
+  /// Fixes the rate; 0: not fixed.
   void hold(double rate_per_s) { held_per_s_ = rate_per_s; }
   bool is_learned() const { return went_ > 0.0; }
-  /// Its standard deviation [1/s]; 0 where the rate is not learned.
+  /// Standard deviation of lambda [1/s]; 0 where the rate is not learned.
   double sigma_per_s() const;
 
-  /// What a point's evidence was and is. When it is surely seen, `is` is {0, since} and its next
-  /// `was` is {}.
+  /// Replaces a point's evidence `was` by `is`. When the point is surely seen, `is` is {0, since}
+  /// and the next `was` is {}.
   void replace(const DecayEvidence& was, const DecayEvidence& is);
 
-  double went() const { return went_; }              ///< Expected points.
-  double exposure_s() const { return exposure_s_; }  ///< Point seconds.
-  /// As they were saved. Throws std::invalid_argument where they cannot be.
+  double went() const { return went_; }              ///< Expected number of removed points.
+  double exposure_s() const { return exposure_s_; }  ///< Sum of existence times of the points [s].
+  /// Restores saved counts. Throws std::invalid_argument where they are impossible.
   void restore(double went, double exposure_s);
 
  private:

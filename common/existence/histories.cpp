@@ -10,17 +10,18 @@
 namespace understory::existence {
 namespace {
 
-/// Histories are alike to a quarter of a pass and an eighth of the time. So many misses say all.
+/// Similar histories differ by less than a quarter of a pass and an eighth of the time. More misses
+/// than kMostMissed add no evidence.
 constexpr double kPerPass = 4.0;
 constexpr double kPerFactor = 8.0;
 constexpr double kMostMissed = 16.0;
-/// Beams behind it from so many sides: it is gone.
+/// With beams behind it from this many sides the point is surely removed.
 constexpr int kMostSides = 4;
-/// A side is 40 degrees wide, and who creeps looks over the border of two: what hides a point from
-/// one of so many sides hides it from all of them with this.
+/// A side is 40 degrees wide, and a slow vehicle may see across the border of two sides.
+/// Probability that an obstacle that hides a point from one of n sides hides it from all of them.
 constexpr std::array kHidesSides{1.0, 0.7, 0.1};
 constexpr int kMostHidden = 3;
-/// Parts of a pass, of a second and of a point that went, in which histories are counted.
+/// Units in which histories are counted: parts of a pass, of a second and of a removed point.
 constexpr double kPassParts = 1024.0;
 constexpr double kSecondParts = 16.0;
 constexpr double kWentParts = 1 << 24;
@@ -55,10 +56,10 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   exposure_ +=
       times * parts_of((1.0 - went) * static_cast<double>(history.counted.since_s), kSecondParts);
 
-  // Which points it is like.
+  // The key of similar histories.
   const double before = std::min(history.missed_before, kMostMissed);
   const auto since_s = static_cast<double>(history.since_s);
-  // Without a miss it may have gone until now.
+  // Without a miss the point may have been removed at any time until now.
   const double until_s = before > 0.0 || history.hidden_before > 0
                              ? std::min(since_s, static_cast<double>(history.until_missed_s))
                              : since_s;
@@ -74,7 +75,7 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   if (key[0] == 0 && key[1] == 0 && key[4] == 0 && key[5] == 0 && key[6] == 0 && key[8] == 0)
     return;
 
-  // Their sums.
+  // The sums.
   Alike& sums = alike_[key];
   sums.points += times;
   sums.missed_before += times * parts_of(before, kPassParts);

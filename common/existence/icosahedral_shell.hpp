@@ -12,7 +12,7 @@
 
 namespace understory::existence {
 
-/// 20 odds, the same 20 as they were when the pass began, 12 distances: 208 bytes.
+/// 20 odds, their 20 values at the begin of the pass, 12 distances: 208 bytes.
 class IcosahedralShell {
  public:
   using Place = FacePoint;
@@ -29,7 +29,7 @@ class IcosahedralShell {
   float visibility_odds(const Place& place) const { return odds_[index_of(place)]; }
   int sector(const Place& place) const { return place.face; }
 
-  /// Barycentric within the face.
+  /// Reach at a place [m], barycentric within the face.
   float reach_m(const Place& place) const {
     float reach = 0.0F;
     for (std::size_t i = 0; i < 3; ++i) reach += place.weights[i] * reach_m_[place.vertices[i]];
@@ -41,7 +41,7 @@ class IcosahedralShell {
     odds = std::clamp(odds * ratio, kLeastVisibilityOdds, most_odds);
   }
 
-  /// Raises the three vertices by the least squares that give the distance at the place.
+  /// Raises the three vertices by least squares, so that the place gets the distance.
   void extend(const Place& place, float distance_m) {
     const float missing_m = distance_m - reach_m(place);
     if (!(missing_m > 0.0F)) return;
@@ -72,7 +72,7 @@ class IcosahedralShell {
     out = std::copy(before_.begin(), before_.end(), out);
     std::copy(reach_m_.begin(), reach_m_.end(), out);
   }
-  /// False where a number cannot be: not finite, odds or reach not above 0.
+  /// False where a number is impossible: not finite, or odds or reach not above 0.
   bool restore(std::span<const float> numbers) {
     const auto can_be = [](float number) { return std::isfinite(number) && number > 0.0F; };
     if (numbers.size() != kNumbers || !std::all_of(numbers.begin(), numbers.end(), can_be))
@@ -94,7 +94,7 @@ class IcosahedralShell {
   static std::size_t index_of(const Place& place) { return static_cast<std::size_t>(place.face); }
 
   std::array<float, kFaces> odds_{};    ///< w_f / (1 - w_f), given that the pass can see the point.
-  std::array<float, kFaces> before_{};  ///< The same when the pass began.
+  std::array<float, kFaces> before_{};  ///< Odds at the begin of the pass.
   std::array<float, kVertices> reach_m_{};  ///< d_v.
 };
 static_assert(Shell<IcosahedralShell>);

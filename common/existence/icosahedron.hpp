@@ -21,7 +21,7 @@ struct IcosahedronFace {
   std::array<std::array<float, 3>, 3> weight_rows{};
 };
 
-/// Where a direction meets the icosahedron.
+/// Intersection of a direction with the icosahedron.
 struct FacePoint {
   int face = 0;
   std::array<std::uint8_t, 3> vertices{};
@@ -118,8 +118,8 @@ inline Eigen::Vector3d icosahedron_vertex(int vertex) {
   return {v[0], v[1], v[2]};
 }
 
-/// The face that a direction (any length above 0) passes through: signs fold it into one octant, in
-/// which four faces are left. About 12 operations and three comparisons.
+/// The face that a direction (any length above 0) passes through: the signs reduce it to one octant
+/// with four faces. About 12 operations and three comparisons.
 inline int face_of(const Eigen::Vector3f& direction) {
   constexpr auto kPhi = static_cast<float>(kGolden);
   constexpr auto kInverse = static_cast<float>(1.0 / kGolden);
@@ -142,7 +142,7 @@ inline int face_of(const Eigen::Vector3f& direction) {
   return face;
 }
 
-/// The face and the weights of its vertices: where the ray in that direction meets the face.
+/// The face and the weights of its vertices: at the intersection of the direction with the face.
 inline FacePoint locate_on_icosahedron(const Eigen::Vector3f& direction) {
   FacePoint point;
   point.face = face_of(direction);

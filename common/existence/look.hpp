@@ -6,10 +6,10 @@
 
 namespace understory::existence {
 
-/// What the sensor measured along the ray to the point, where it has ranges.
+/// Range measurement along the ray to the point, if the sensor has ranges.
 enum class Ray : std::uint8_t {
   kUnknown,  ///< No range, or one at the point itself.
-  kBlocked,  ///< A return clearly in front of the point: hidden by something.
+  kBlocked,  ///< A return clearly in front of the point: hidden by an obstacle.
   kPassed,   ///< A return clearly behind it: nothing on the ray.
 };
 
@@ -17,11 +17,13 @@ enum class Ray : std::uint8_t {
 struct Look {
   Eigen::Vector3f from_point_m;  ///< Sensor minus point, frame of the map.
   Ray ray = Ray::kUnknown;       ///< Read by miss() only.
-  /// The point's pass goes on, though the model has begun another one: it has been in view since.
+  /// The point stays in its pass although the model has begun another one, because it has been in
+  /// view since.
   bool goes_on = false;
 };
 
-/// Range along the ray against the point's distance, both [m]; `tolerance_m`: what both may be off.
+/// Range along the ray against the point's distance, both [m]; `tolerance_m`: tolerance for the
+/// errors of both.
 inline Ray ray_of(double range_m, double distance_m, double tolerance_m) {
   if (range_m < distance_m - tolerance_m) return Ray::kBlocked;
   if (range_m > distance_m + tolerance_m) return Ray::kPassed;

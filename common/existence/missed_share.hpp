@@ -9,7 +9,7 @@
 
 namespace understory::existence {
 
-/// 1 - v, to 0.01 %, from 1.5e-5 on.
+/// 1 - v with a resolution of 0.01 %, at least 1.5e-5.
 class MissedShare {
  public:
   static constexpr int kCodesPerOctave = 4096;
@@ -23,8 +23,8 @@ class MissedShare {
   double value() const { return std::exp2(-static_cast<double>(code_) / kCodesPerOctave); }
   /// (1 - v) / v.
   double odds() const { return odds_of(value()); }
-  /// For P of later passes, in steps of 2 %: a missed one says no more than 200 to 1, and what a
-  /// few looks teach of v does not move the whole map.
+  /// 1 - v for P of later passes, in steps of 2 %: a missed pass has at most a likelihood ratio of
+  /// 200, and v from a few looks does not change the whole map.
   double stepped() const {
     return std::exp2(std::round(32.0 * std::log2(std::max(0.005, value()))) / 32.0);
   }

@@ -10,7 +10,7 @@
 namespace understory::existence {
 namespace {
 
-/// What the share of real births counts for at first.
+/// Initial weight of the share of real births, in points.
 constexpr double kBirthWeight = 10.0;
 
 void require(bool holds, const char* name, double value, const char* allowed) {

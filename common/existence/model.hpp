@@ -1,4 +1,4 @@
-// What all points of one map share: parameters, and what was learned about detector and world.
+// Common to all points of one map: parameters, and learned values of detector and world.
 #pragma once
 
 #include <array>
@@ -11,26 +11,26 @@
 
 namespace understory::existence {
 
-/// What a model has learned, as plain numbers: to be stored with the map.
+/// Learned values of a model as plain numbers, stored with the map.
 struct SavedModel {
   static constexpr std::uint64_t kVersion = 2;  ///< 1: without `learned`.
   std::uint64_t version = kVersion;
   std::uint64_t pass = 0;
   std::array<double, DetectorRecall::kNumbers> recall{};
-  std::array<double, 2> births{};  ///< Real, false.
-  std::array<double, 2> decay{};   ///< Went, exposure [s].
+  std::array<double, 2> births{};  ///< Counts of real and of false points.
+  std::array<double, 2> decay{};   ///< Removed points, exposure [s].
   std::array<double, LearnedRates::kNumbers> learned{};
 };
 
-/// Time that passed, for all points that it passed for.
+/// Elapsed time and its factors, for all points.
 struct Elapsed {
   float dt_s = 0.0F;
   double lost = 0.0;   ///< 1 - exp(-lambda dt).
   float moved = 0.0F;  ///< 1 - exp(-mu dt).
 };
 
-/// One per map. A *pass* is a stretch of time in which what hinders the detector at a point stays
-/// as it is: a drive, or one way through a place.
+/// One per map. A *pass* is a time interval in which the causes of misses at a point stay constant:
+/// a drive, or one way through a place.
 class ExistenceModel {
  public:
   /// Throws std::invalid_argument (see check()).
@@ -42,9 +42,9 @@ class ExistenceModel {
   const DecayRate& decay() const { return decay_; }
   DecayRate& decay() { return decay_; }
 
-  /// A new pass begins; points notice at their next look.
+  /// Begins a new pass; points follow at their next look.
   void begin_pass() { ++pass_; }
-  /// Another drive, after learn(): a pass whose v is its own.
+  /// Begins another drive, after learn(): a pass with its own v.
   void begin_drive();
   std::uint32_t pass() const { return pass_; }
 
@@ -52,29 +52,28 @@ class ExistenceModel {
   /// where it is not finite or below 0.
   Elapsed elapsed(double dt_s) const;
 
-  /// v and lambda anew by what became of all points (PointExistence::tell): the means of their
-  /// joint posterior, until the next call. Each point is to reconsider() once then. Without it v
-  /// and lambda are what the counts say so far.
+  /// Computes v and lambda from the histories of all points (PointExistence::tell): the means of
+  /// their joint posterior, valid until the next call. Call reconsider() once for each point
+  /// afterwards. Without learn(), v and lambda follow from the counts.
   void learn(const PassHistories& histories);
-  /// A pass that surely saw a point, and those since the last one that had missed it.
+  /// Counts passes: `seen` surely saw a point, `missed` missed it since the last sure sighting.
   void record_passes(double seen, double missed);
-  /// What learn() has said; `now` is 0 where it was not called yet.
+  /// Result of learn(); `now` is 0 before its first call.
   const LearnedRates& learned() const { return learned_; }
 
-  /// Share of what is looked at from one side only that something hides on this drive; 0 where
-  /// learn() was not called.
+  /// Hidden share of the points observed from one side only on this drive; 0 before learn().
   double hidden() const { return learned_.hidden; }
 
   /// P of a point at its first sighting: the share of earlier new points that were real.
   double birth() const { return births_.mean(); }
-  /// What a new point seems to be after its first pass: the probability that it is real.
+  /// Counts a new point after its first pass, with its probability to be real.
   void record_birth(double is_real) { births_.add(is_real, 1.0 - is_real); }
 
-  float rest_odds() const { return rest_odds_; }  ///< Of the visibility.
+  float rest_odds() const { return rest_odds_; }  ///< Odds of the start visibility.
   double false_rate() const { return parameters_.false_rate; }
 
   SavedModel save() const;
-  /// Throws std::invalid_argument; the model is then as it was.
+  /// Throws std::invalid_argument; the model is then unchanged.
   void load(const SavedModel& saved);
 
  private:

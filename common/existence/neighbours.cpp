@@ -37,7 +37,7 @@ PatchMember Patch::join(double odds_before) const {
   check_odds(odds_before);
   PatchMember member;
   member.before = probability_of(odds_before);
-  // The clearing is part of what P fell by: before = (1 - cleared) alone + cleared kept.
+  // P before the looks already includes the clearing: before = (1 - cleared) alone + cleared kept.
   member.alone =
       std::min(1.0 - 1e-6, member.before / (1.0 - parameters_.cleared * parameters_.gone_in_it));
   member.kept = member.alone * (1.0 - parameters_.gone_in_it);
@@ -49,7 +49,7 @@ void Patch::update(PatchMember& member, double odds, std::uint32_t missed_from) 
   sum_cleared_ -= member.cleared;
   sum_occluded_ -= member.occluded;
 
-  // Likelihoods of the member's looks, over that of "it is gone".
+  // Likelihoods of the member's looks relative to "removed".
   member.ratio = odds / odds_of(member.before);
   const double alone = member.alone * member.ratio + 1.0 - member.alone;
   member.cleared = std::log((member.kept * member.ratio + 1.0 - member.kept) / alone);
@@ -67,7 +67,7 @@ std::array<double, 3> Patch::log_weights(double cleared, double occluded) const 
 }
 
 double Patch::probability(const PatchMember& member) const {
-  // Hypotheses by the others' looks.
+  // Probabilities of the hypotheses by the other members' looks.
   const auto [alone, cleared, occluded] =
       normalised(log_weights(sum_cleared_ - member.cleared, sum_occluded_ - member.occluded));
   const double there =

@@ -6,8 +6,8 @@
 
 namespace understory::existence {
 
-/// Bayes' rule on odds is one multiplication by the likelihood ratio: the sum of log-odds without
-/// the logarithm. As precise near 0 as near 1.
+/// Bayes' rule on odds is one multiplication by the likelihood ratio: it replaces the sum of
+/// log-odds, without a logarithm. As precise near 0 as near 1.
 inline double odds_of(double probability) { return probability / (1.0 - probability); }
 
 /// The probability of finite odds.
@@ -16,8 +16,8 @@ inline double probability_of(double odds) { return odds / (1.0 + odds); }
 /// Bounds of P(exists): 1e-6 and 1 - 1e-6, as odds.
 inline constexpr double kLeastOdds = 1e-6 / (1.0 - 1e-6);
 inline constexpr double kMostOdds = (1.0 - 1e-6) / 1e-6;
-/// Most odds within a pass: what it has seen outweighs what hides the point from ten directions of
-/// the same pass. The next pass begins at kMostOdds.
+/// Largest odds within a pass: its hits outweigh occlusion from ten directions of the same pass.
+/// The next pass starts at most at kMostOdds.
 inline constexpr double kMostOddsInPass = 1e12;
 
 /// P <- P exp(-rate dt) on odds; `lost` = 1 - exp(-rate dt). Exact also where `lost` is 1e-15.

@@ -1,4 +1,4 @@
-// Whether something hides a point all along a pass, by what was measured along the rays.
+// Probability that an obstacle hides a point during a whole pass, from ranges along the rays.
 #pragma once
 
 #include <algorithm>
@@ -11,15 +11,15 @@
 
 namespace understory::existence {
 
-/// Hidden variable H of a pass: something stands in front of the point from wherever it is looked
-/// at. It is as likely for a point that is there as for one that is gone. Looks of a hidden pass
-/// measure a return in front with kInFront, else nothing, as at the edge of what hides the point;
-/// those of another pass with kBeside, past single things. A pass whose line of sight was free once
-/// is not hidden; neither is one that never measured anything in front: what hides a point there is
-/// known by directions alone. Hits do not count: they speak for themselves. 8 bits.
+/// Hidden variable H of a pass: an obstacle stands in front of the point from every viewpoint. It
+/// is equally likely for an existing and a removed point. A look of a hidden pass measures a return
+/// in front with probability kInFront, else no return, as at the edge of the obstacle; a look of
+/// another pass with kBeside, from single objects. A pass with a free line of sight in one look is
+/// not hidden; nor is a pass without a return in front: there only directions give evidence of
+/// occlusion. Hits are not counted; they are direct evidence. 8 bits.
 class PassOccluder {
  public:
-  /// After a look that did not see the point, by what was measured along its ray.
+  /// The state after a look that missed the point, from the range along its ray.
   PassOccluder after(Ray ray) const {
     if (ray == Ray::kPassed || code_ == kRefuted) return refuted();
     const unsigned one = ray == Ray::kBlocked ? kBlocked : kUnknown;
@@ -33,29 +33,30 @@ class PassOccluder {
 
   /// p(H); 0 without a return in front.
   float chance() const { return chances()[code_]; }
-  /// What the looks say of a point that is there, that no occluder hides and that the detector
-  /// misses, by what they say of one that is gone, hidden or not. It stops the beams itself, where
-  /// it is not too thin for them, and what is gone does not. 1 without a return in front.
+  /// Likelihood ratio of the looks: an existing point without an occluder that the detector misses,
+  /// against a removed point, hidden or not. An existing point stops the beams itself unless it is
+  /// too thin; a removed point does not. 1 without a return in front.
   double stopped_itself() const {
     const double hidden = static_cast<double>(chance());
     const double by_itself = hidden * (1.0 - kPrior) / kPrior;
     return 1.0 - hidden + kStopsBeams * std::max(0.0, by_itself - (1.0 - hidden));
   }
-  /// Whether a pass that is over and did not see the point was rather hidden than not: one of those
-  /// that missed_when_hidden() is about.
+  /// Whether a closed pass that did not see the point was probably hidden; missed_when_hidden()
+  /// applies to such passes.
   bool is_hidden_pass() const { return static_cast<double>(chance()) >= kHiddenFrom; }
-  /// chance() + stopped_itself() * missed_share for a pass like that, whatever its returns were.
-  /// Their ratio hardly differs, and this one goes to no end where v goes to 1.
+  /// chance() + stopped_itself() * missed_share for a typical hidden pass, independent of its
+  /// returns. The ratio is nearly the same for all, and this form stays bounded when v approaches
+  /// 1.
   static double missed_when_hidden(double missed_share) {
     return kHiddenPass * (1.0 + kItselfToHidden * missed_share);
   }
-  /// The part of it that the detector missed.
+  /// The part of missed_when_hidden() missed by the detector.
   static double missed_itself(double missed_share) {
     return kItselfToHidden * missed_share / (1.0 + kItselfToHidden * missed_share);
   }
-  /// Whether a return in front of the point or behind it was measured, or it was found.
+  /// Whether a return in front of the point or behind it was measured, or the point was found.
   bool has_told() const { return code_ >= kBlocked; }
-  /// Whether no look has come yet.
+  /// Whether there was no look yet.
   bool is_new() const { return code_ == 0; }
 
   /// For save and load: any byte is a state.
@@ -67,19 +68,22 @@ class PassOccluder {
   }
 
  private:
-  static constexpr double kPrior = 0.05;      ///< p(H).
-  static constexpr double kInFront = 0.7;     ///< Looks with a return in front, of a hidden pass,
-  static constexpr double kBeside = 0.1;      ///< and of another one.
-  static constexpr double kStopsBeams = 0.5;  ///< Share of the missed points that are thick enough.
-  static constexpr double kDependent = 0.5;   ///< What a look counts for: neighbours are alike.
-  static constexpr double kMost = 0.95;       ///< Of p(H): this model is not all.
-  static constexpr double kHiddenFrom = 0.2;  ///< p(H) of a hidden pass, when it is over,
-  static constexpr double kHiddenPass = 0.8;  ///< and what it is in the mean.
-  static constexpr double kItselfToHidden = 10.0;  ///< stopped_itself() by chance() there.
+  static constexpr double kPrior = 0.05;  ///< p(H).
+  /// Share of looks with a return in front, in a hidden pass.
+  static constexpr double kInFront = 0.7;
+  static constexpr double kBeside = 0.1;  ///< The same in another pass.
+  /// Share of missed points thick enough to stop beams.
+  static constexpr double kStopsBeams = 0.5;
+  static constexpr double kDependent = 0.5;   ///< Weight of a look: adjacent looks are correlated.
+  static constexpr double kMost = 0.95;       ///< Upper limit of p(H), for errors of this model.
+  static constexpr double kHiddenFrom = 0.2;  ///< p(H) from which a closed pass counts as hidden.
+  static constexpr double kHiddenPass = 0.8;  ///< Mean p(H) of such passes.
+  /// Ratio stopped_itself() / chance() of such passes.
+  static constexpr double kItselfToHidden = 10.0;
   static constexpr std::uint8_t kRefuted = 0xFF;
   static constexpr unsigned kBlocked = 0x10;  ///< One look in the code.
   static constexpr unsigned kUnknown = 0x01;
-  static constexpr unsigned kMostCounted = 14;  ///< Then both halve, and their ratio stays.
+  static constexpr unsigned kMostCounted = 14;  ///< Beyond it both counts are halved.
 
   static const std::array<float, 256>& chances() {
     static const std::array<float, 256> kTable = [] {
@@ -97,7 +101,8 @@ class PassOccluder {
     return static_cast<float>(std::min(kMost, odds / (1.0 + odds)));
   }
 
-  std::uint8_t code_ = 0;  ///< Looks: blocked in the upper four bits, unknown in the lower.
+  /// Number of looks: blocked in the upper four bits, unknown in the lower.
+  std::uint8_t code_ = 0;
 };
 
 }  // namespace understory::existence

@@ -1,4 +1,4 @@
-// The probability that one map point still exists, and the shell from which it can be seen.
+// The probability that one map point still exists, and its shell of visibility.
 #pragma once
 
 #include <algorithm>
@@ -32,22 +32,22 @@ namespace understory::existence {
 ///     hit:   P : 1-P  times  qe : eps    d : 1-d  times  q : eps    w : 1-w  times  q1 : eps
 ///
 /// At the end of a pass w <- d w + (1 - d) w(begin of the pass), and d <- v. Where the sensor
-/// measured something in front of the point, the pass may be hidden (PassOccluder): before its
-/// looks D had v (1 - h), not v, and E and not D h + s (1 - v), where s is what the returns say of
-/// a point that stops the beams itself. The mass of E and not D does not depend on the looks, so
-/// that those that came before are weighed anew with any change of h, exactly and in any order.
-/// Constant cost: no logarithm, no exponential, odds instead of log-odds.
+/// measured a return in front of the point, the pass may be hidden (PassOccluder): before its looks
+/// D had v (1 - h), not v, and E and not D h + s (1 - v), where s is the likelihood ratio of the
+/// returns for a point that stops the beams itself. The probability of E and not D does not depend
+/// on the looks, so earlier looks are reweighted exactly at any change of h, in any order. Constant
+/// cost: no logarithm, no exponential, odds instead of log-odds.
 template <Shell S>
 class PointExistence {
  public:
-  /// A point that is known from elsewhere: P is the model's prior.
+  /// A point from another source: P is the model's prior.
   static PointExistence known(const ExistenceModel& model) {
     PointExistence point(model, odds_of(model.parameters().prior));
     point.flags_ = kWasSure;
     return point;
   }
-  /// A point at its first sighting: P is the model's share of real births, and if it is one, the
-  /// pass and the line of sight are good. Throws std::invalid_argument as hit() does.
+  /// A point at its first sighting: P is the model's share of real births; if the point is real,
+  /// the pass can see it and the line of sight is free. Throws std::invalid_argument as hit() does.
   static PointExistence born(const ExistenceModel& model, const Look& look) {
     PointExistence point(model, odds_of(model.birth()));
     point.flags_ = kIsNew | kInFirstPass;
@@ -59,18 +59,19 @@ class PointExistence {
   }
 
   double probability() const { return probability_of(std::min(odds_, kMostOdds)); }
-  /// Of the pass that is open: up to 12 decades, so that a new pass begins at what probability()
-  /// gives.
+  /// Log-odds in the open pass: up to 12 decades; a new pass starts from probability().
   double log_odds() const { return std::log(odds_); }
   /// p(D | E): whether this pass can see the point.
   double pass_visibility() const { return 1.0 / (1.0 + unseen_); }
   /// Sectors of the shell (bits) from which this pass missed the point.
   std::uint32_t missed_from() const { return missed_from_; }
-  /// Sectors from which this pass has looked, with returns in front of the point left out.
+  /// Sectors from which this pass has looked, without looks that had a return in front of the
+  /// point.
   std::uint32_t looked_from() const { return missed_from_ | marked_; }
   const S& shell() const { return shell_; }
 
-  /// Expected and seen. Throws std::invalid_argument where the look is not finite or has no length.
+  /// The point was expected and seen. Throws std::invalid_argument where the look is not finite or
+  /// has no length.
   void hit(ExistenceModel& model, const Look& look) {
     if (!look.goes_on) enter_pass(model);
     const View view = view_of(model, look);
@@ -80,8 +81,8 @@ class PointExistence {
     last_hit_ = view.sector;
   }
 
-  /// Expected and not seen. What was blocked says nothing of the point, but of the pass: misses
-  /// without a range, earlier ones as well, count for less then.
+  /// The point was expected and not seen. A blocked look is evidence on the pass, not on the point:
+  /// misses without a range, earlier ones included, then have less weight.
   void miss(ExistenceModel& model, const Look& look) {
     if (!look.goes_on) enter_pass(model);
     const View view = view_of(model, look);
@@ -93,35 +94,35 @@ class PointExistence {
     last_hit_ = kNowhere;
   }
 
-  /// Time without looks. Only how much matters, not in how many parts (but for rounding).
+  /// Time without looks. Several calls have the effect of one with their sum, except for rounding.
   void elapse(const ExistenceModel& model, const Elapsed& time) {
     odds_ = bounded(survived(odds_, time.lost));
     shell_.relax(static_cast<float>(model.parameters().visibility), time.moved);
     gap_s_ += time.dt_s;
   }
 
-  /// Ends the pass of this point, when nothing else will: before its state is read for good.
+  /// Ends the point's pass if the model has begun another one; call it before the final reading of
+  /// its state.
   void enter_pass(ExistenceModel& model) {
     if (pass_ != number_of(model)) change_pass(model);
   }
 
-  /// What became of the point since it was last surely seen: for ExistenceModel::learn().
+  /// Adds the point's history since it was last surely seen, for ExistenceModel::learn().
   void tell(PassHistories& histories) const {
     if (const auto open = history()) histories.add(*open);
   }
-  /// The same taken back: before the point changes, where histories are kept.
+  /// Removes it again; call it before the point changes.
   void take_back(PassHistories& histories) const {
     if (const auto open = history()) histories.remove(*open);
   }
 
-  /// P anew by what all points have taught about v and lambda, in this pass and in those before.
-  /// O(1).
+  /// Computes P again from the learned v and lambda, of this pass and of those before. O(1).
   void reconsider(ExistenceModel& model) { reconsider(model, model.learned().before_was); }
-  /// The same for a point that left out some calls of learn(): `before_was` is
-  /// LearnedRates::before as it was when P last followed it.
+  /// The same for a point that missed some calls of learn(): `before_was` is LearnedRates::before
+  /// at the last reconsider().
   void reconsider(ExistenceModel& model, double before_was);
 
-  /// P after evidence from elsewhere (neighbours, other sensors): a factor on its odds. Throws
+  /// Applies other evidence (neighbours, other sensors): a factor on the odds of P. Throws
   /// std::invalid_argument where it is not finite or below 0.
   void multiply_odds(double ratio) {
     if (!std::isfinite(ratio) || ratio < 0.0)
@@ -130,11 +131,11 @@ class PointExistence {
   }
 
   SavedPoint<S> save() const;
-  /// Throws std::invalid_argument where the state is of another version or shell, or cannot be.
+  /// Throws std::invalid_argument where the state has another version or shell, or is impossible.
   static PointExistence load(const ExistenceModel& model, const SavedPoint<S>& saved);
 
  private:
-  /// A look, measured against the shell.
+  /// A look relative to the shell.
   struct View {
     typename S::Place place;
     float distance_m = 0.0F;
@@ -143,24 +144,25 @@ class PointExistence {
     std::uint32_t sector = 0;
   };
   enum class Seen : std::uint8_t { kHit, kMiss, kNothing };
-  /// OpenHistory's `rays` and `missed_now`.
+  /// `rays` and `missed_now` of OpenHistory.
   struct RaysAndMiss {
     double rays = 1.0;
     double missed = 0.0;
   };
   static constexpr std::uint32_t kNowhere = 31;
   static constexpr std::uint32_t kSectors = 0xFFFFFF;
-  static constexpr std::uint32_t kIsNew = 1;  ///< What became of the birth is open.
+  static constexpr std::uint32_t kIsNew = 1;  ///< It is not yet counted as real or false.
   static constexpr std::uint32_t kInFirstPass =
       2;                                        ///< The pass that found it does not count for v.
-  static constexpr std::uint32_t kWasSure = 4;  ///< Surely seen in some pass: it was real.
-  static constexpr double kUnit = 256.0;        ///< Of pending passes.
+  static constexpr std::uint32_t kWasSure = 4;  ///< Surely seen in some pass, so it is real.
+  static constexpr double kUnit = 256.0;        ///< Unit of pending passes.
   static constexpr std::uint32_t kSeenEnd = 65536;
   static constexpr std::uint32_t kMissedEnd = 8192;
   static constexpr std::uint32_t kHiddenEnd = 8;
-  static constexpr std::uint32_t kWhole = 255;  ///< Of a share in 8 bits.
-  static constexpr double kHiddenUnit = 256.0;  ///< Likewise, always below 1.
-  /// A pass has looked for the point where one that can see it had missed it with less than that.
+  static constexpr std::uint32_t kWhole = 255;  ///< Maximum of a share in 8 bits.
+  static constexpr double kHiddenUnit = 256.0;  ///< The same for a share always below 1.
+  /// A pass counts as a search for the point if a pass that can see it would have missed it with a
+  /// probability below this.
   static constexpr float kLookedFor = 0.2F;
 
   PointExistence(const ExistenceModel& model, double odds)
@@ -170,14 +172,15 @@ class PointExistence {
     start_pass(model);
   }
 
-  /// Of the pass, in 16 bits: a point that slept through 65536 passes goes on with its last one.
+  /// Number of the pass in 16 bits: after 65536 passes without a look a point continues its last
+  /// pass.
   static std::uint16_t number_of(const ExistenceModel& model) {
     return static_cast<std::uint16_t>(model.pass());
   }
 
   static double bounded(double odds) { return std::clamp(odds, kLeastOdds, kMostOddsInPass); }
 
-  /// 1 up to the reach, 0 from 1.25 times it on, smooth between.
+  /// 1 up to the reach, 0 beyond 1.25 times the reach, smooth between.
   static double within_reach(float distance_m, float reach_m) {
     const float excess = std::clamp((distance_m / reach_m - 1.0F) * 4.0F, 0.0F, 1.0F);
     return 1.0F - excess * excess * (3.0F - 2.0F * excess);
@@ -217,7 +220,7 @@ class PointExistence {
   void apply_miss(const ExistenceModel& model, View view, bool ray_passed) {
     const double eps = model.false_rate();
     const double recall = view.recall * within_reach(view.distance_m, shell_.reach_m(view.place));
-    // A ray that went on behind the point shows that the line of sight is free.
+    // A ray that passed behind the point shows a free line of sight.
     const double visible = ray_passed ? 1.0 : view.visible;
     const double unlike = 1.0 - visible * recall;  // (1 - q) / (1 - eps)
     const double d = pass_visibility();
@@ -230,7 +233,7 @@ class PointExistence {
       shell_.multiply(view.place, static_cast<float>(1.0 - recall), model.rest_odds());
   }
 
-  /// Rays of one viewpoint in one pass pass a point for one reason: they count once.
+  /// Rays of one viewpoint in one pass share one cause for passing a point: they count once.
   void count_ray(const ExistenceModel& model, const View& view) {
     const std::uint32_t bit = 1U << view.sector;
     if ((rays_passed() & bit) != 0) return;
@@ -238,9 +241,9 @@ class PointExistence {
     odds_ = bounded(odds_ * model.parameters().passed_by);
   }
 
-  /// What a look says of what hides the point, before it says anything of the point: its ray, and
-  /// from where it is. If that changes p(H), the pass so far is weighed anew: d began with
-  /// v (1 - h). With v = 1 there is no such pass.
+  /// Applies a look's evidence on occlusion (range and viewpoint), before its evidence on the
+  /// point. If p(H) changes, the pass so far is reweighted: d started from v (1 - h). With v = 1 no
+  /// pass is hidden.
   void look_from(const View& view, PassOccluder occluder, Seen seen) {
     const std::uint32_t bit = 1U << view.sector;
     const bool is_new_side = seen != Seen::kNothing && (looked_from() & bit) == 0;
@@ -265,24 +268,25 @@ class PointExistence {
     if (seen == Seen::kMiss) marked_ &= ~bit & kSectors;
     if (seen == Seen::kMiss) missed_from_ |= bit;
   }
-  /// The pass so far with other chances before its looks: of E and D, of E and not D.
+  /// Reweights the pass so far for other priors: factors on E and D, and on E and not D.
   void reweigh(double seeing, double not_seeing) {
     const double d = pass_visibility();
     odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
     scale_unseen(not_seeing / seeing);
   }
 
-  /// p(H): something hides the point from wherever this pass looks at it. What was measured along
-  /// the rays tells, else from how many sides the pass has looked.
+  /// p(H): an obstacle hides the point from every viewpoint of this pass. From ranges along the
+  /// rays, else from the number of sides from which the pass has looked.
   double hidden() const {
     if (occluder_.has_told()) return static_cast<double>(occluder_.chance());
     return hidden_share_ / kHiddenUnit * hides_all(std::popcount(looked_from()));
   }
-  /// What the returns say of a point that is there, not hidden and missed: 1 - h without any.
+  /// Likelihood ratio of the returns for an existing point, not hidden and missed; 1 - h without
+  /// returns.
   double stopped_itself() const {
     return occluder_.has_told() ? occluder_.stopped_itself() : 1.0 - hidden();
   }
-  /// E and not D before the looks, with what they say of an occluder.
+  /// Prior of "E and not D" with the looks' evidence on an occluder.
   double blind(MissedShare missed_share) const {
     return hidden() + stopped_itself() * missed_share.value();
   }
@@ -317,13 +321,13 @@ class PointExistence {
   double missed_passes() const { return pending_missed_ / kUnit; }
   bool has_missed() const { return missed_passes() > 0.25 || pending_hidden_ > 0; }
   bool is_pending() const { return pending_missed_ > 0 || pending_hidden_ > 0; }
-  /// Of the passes that missed the point, with 1 - v `is` in place of `was`.
+  /// Likelihood ratio of the passes that missed the point, for 1 - v = `is` against `was`.
   static double missed_ratio(double is, double was, double missed, int hidden) {
     const double hidden_ratio =
         PassOccluder::missed_when_hidden(is) / PassOccluder::missed_when_hidden(was);
     return std::pow(is / was, missed) * std::pow(hidden_ratio, hidden);
   }
-  /// 16 bits of lambda's fraction.
+  /// lambda with 16 bits of its fraction.
   float decay_per_s() const { return std::bit_cast<float>(std::uint32_t{decay_bits_} << 8U); }
   void keep_decay(float per_s) {
     decay_bits_ = (std::bit_cast<std::uint32_t>(per_s) >> 8U) & 0xFFFFFFU;
@@ -336,12 +340,12 @@ class PointExistence {
     return evidence_.since_s * static_cast<float>(until_missed_) / static_cast<float>(kWhole);
   }
   bool is_surely_seen(double probability) const { return probability > 0.9 && unseen_ < 1e-3F; }
-  /// So many more passes; the count stays below `end` / 256.
+  /// Adds pending passes; the count stays below `end` / 256.
   static std::uint32_t with_pending(std::uint32_t count, double passes, std::uint32_t end) {
     return static_cast<std::uint32_t>(std::min(end - 1.0, std::round(count + kUnit * passes)));
   }
 
-  /// d, lambda and what may be hidden, of the pass that begins.
+  /// Sets d, lambda and the hidden share for the pass that begins.
   void expect_pass(const ExistenceModel& model) {
     const double v = model.recall().of_pass();
     unseen_ = static_cast<float>((1.0 - v) / v);
@@ -366,23 +370,25 @@ class PointExistence {
   double odds_;  ///< P / (1 - P).
   S shell_;
   std::uint16_t pass_;
-  MissedShare missed_share_;       ///< 1 - v as it was when the pass began.
-  std::uint32_t marked_ : 24 = 0;  ///< Sectors of this pass: rays passed the point, where missed;
-                                   ///< else seen with every look.
+  MissedShare missed_share_;  ///< 1 - v at the begin of the pass.
+  /// Sectors of this pass: with a miss, rays passed the point; else every look saw it.
+  std::uint32_t marked_ : 24 = 0;
   std::uint32_t last_hit_ : 5 = kNowhere;  ///< Sector of the pass's last look, if it was a hit.
   std::uint32_t flags_ : 3 = 0;
   std::uint32_t missed_from_ : 24 = 0;  ///< Sectors of this pass with misses.
-  PassOccluder occluder_;               ///< Of this pass, in the last byte of the sectors' word.
-  float unseen_ = 0.0F;                 ///< (1 - d) / d.
-  std::uint32_t chance_bits_ : 24 = 0;  ///< Of a pass that can see it, up to now: a float's first.
-  std::uint32_t hidden_share_ : 8 = 0;  ///< ExistenceModel::hidden() when the pass began.
-  std::uint16_t pending_seen_ = 0;      ///< Passes since the last that surely saw the point,
-  std::uint16_t pending_missed_ : 13 = 0;  ///< in parts of 1 / 256,
-  std::uint16_t pending_hidden_ : 3 = 0;   ///< and others with returns in front of it.
-  DecayEvidence evidence_;                 ///< Up to the begin of this pass.
-  std::uint32_t decay_bits_ : 24 = 0;  ///< lambda as it was when the pass began: a float's first.
+  PassOccluder occluder_;  ///< Occluder of this pass, in the last byte of the sectors' word.
+  float unseen_ = 0.0F;    ///< (1 - d) / d.
+  /// Probability of the misses so far for a pass that can see it: first bits of a float.
+  std::uint32_t chance_bits_ : 24 = 0;
+  std::uint32_t hidden_share_ : 8 = 0;  ///< ExistenceModel::hidden() at the begin of the pass.
+  /// Passes that can see the point, since it was surely seen [1 / 256].
+  std::uint16_t pending_seen_ = 0;
+  std::uint16_t pending_missed_ : 13 = 0;  ///< Passes that missed it since then [1 / 256].
+  std::uint16_t pending_hidden_ : 3 = 0;   ///< Hidden passes since then.
+  DecayEvidence evidence_;                 ///< Evidence up to the begin of this pass.
+  std::uint32_t decay_bits_ : 24 = 0;  ///< lambda at the begin of the pass: first bits of a float.
   std::uint32_t until_missed_ : 8 = kWhole;  ///< Share of evidence_.since_s, see OpenHistory.
-  float gap_s_ = 0.0F;                       ///< Since this pass began, without looks.
+  float gap_s_ = 0.0F;                       ///< Time without looks since this pass began.
 };
 
 }  // namespace understory::existence

@@ -1,4 +1,4 @@
-// What a point's passes teach the model, and what the model then says of the point. Part of
+// Learning from a point's passes, and the correction of the point by the learned rates. Part of
 // point.hpp.
 #pragma once
 
@@ -27,8 +27,8 @@ std::optional<OpenHistory> PointExistence<S>::history() const {
                      .counted = evidence_};
 }
 
-/// The looks by what they say of a point that is gone: h + s (1 - v) + (1 - h) L / L0 v. L / L0 by
-/// the odds of D: v is in both, so that it falls out. So does what was hidden by no return.
+/// Likelihood ratio of the looks against a removed point: h + s (1 - v) + (1 - h) L / L0 v. L / L0
+/// follows from the odds of D; v cancels, and so does occlusion without a return.
 template <Shell S>
 typename PointExistence<S>::RaysAndMiss PointExistence<S>::open_pass() const {
   if (unseen_ <= 0.0F) return {};
@@ -52,7 +52,7 @@ void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
     weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
 }
 
-/// The pass so far as if v, and what may be hidden, had been what they are now.
+/// Reweights the pass so far for the present v and hidden share.
 template <Shell S>
 void PointExistence<S>::correct_pass(const ExistenceModel& model) {
   const double was = (1.0 - missed_share_.value()) * (1.0 - hidden());
@@ -67,7 +67,7 @@ void PointExistence<S>::correct_pass(const ExistenceModel& model) {
 template <Shell S>
 void PointExistence<S>::change_pass(ExistenceModel& model) {
   shell_.end_pass(static_cast<float>(pass_visibility()));
-  // P as it was after the looks: time has lowered it since.
+  // P after the looks, before time lowered it.
   const double lost = lost_share(model.decay().mean_per_s(), gap_s_);
   const double after = std::min(1.0, probability() / (1.0 - lost));
   const bool was_looked_for = chance_missed() < kLookedFor;
@@ -95,7 +95,7 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
     correct_odds(model, missed_share, learned.before_was, decay_per_s, kMostOdds);
 }
 
-/// The time since this pass began has passed.
+/// Applies the time without looks since this pass began.
 template <Shell S>
 void PointExistence<S>::pass_gap(ExistenceModel& model, double went) {
   const float since_s = evidence_.since_s + gap_s_;
@@ -106,8 +106,8 @@ void PointExistence<S>::pass_gap(ExistenceModel& model, double went) {
       static_cast<std::uint32_t>(std::round(std::clamp(share, 0.0F, 1.0F) * kWhole)) & kWhole;
 }
 
-/// Recall of passes and decay. What is open since the point was last surely seen counts with the
-/// probability that it is still there.
+/// Learns the recall of passes and the decay. Passes since the last sure sighting count with the
+/// probability that the point still exists.
 template <Shell S>
 void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, bool was_looked_for) {
   const bool counts = was_looked_for && (flags_ & kInFirstPass) == 0;
@@ -125,7 +125,8 @@ void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, boo
   evidence_ = {};
 }
 
-/// Until more is known of it. What a hidden pass missed depends on v: it is kept as such.
+/// Adds the pass to the pending ones. The miss of a hidden pass depends on v, so it is counted
+/// separately.
 template <Shell S>
 void PointExistence<S>::keep_pass(ExistenceModel& model) {
   const std::uint32_t seen = pending_seen_, missed = pending_missed_;
@@ -139,14 +140,15 @@ void PointExistence<S>::keep_pass(ExistenceModel& model) {
                                weight * (pending_missed_ - missed));
 }
 
-/// The part of this pass that missed the point: what was hidden says nothing of the detector.
+/// Probability that the detector missed the point in this pass; a hidden point is no evidence on
+/// the detector.
 template <Shell S>
 double PointExistence<S>::missed_by_detector() const {
   const double missed = stopped_itself() * missed_share_.value();
   return (1.0 - pass_visibility()) * missed / blind(missed_share_);
 }
 
-/// What the point counts for is taken back and counted anew.
+/// Replaces the point's contribution to the counts.
 template <Shell S>
 void PointExistence<S>::weigh(ExistenceModel& model, const DecayEvidence& is) {
   if ((flags_ & kWasSure) != 0) model.decay().replace(evidence_, is);
@@ -156,8 +158,8 @@ void PointExistence<S>::weigh(ExistenceModel& model, const DecayEvidence& is) {
   evidence_ = is;
 }
 
-/// P by what is known of v and lambda now, since the point was last surely seen: each missed pass
-/// weighs 1 - v, and the odds of having survived are those of lambda.
+/// Corrects P for the present v and lambda since the last sure sighting: each missed pass has the
+/// factor 1 - v, and the odds of survival follow from lambda.
 template <Shell S>
 void PointExistence<S>::correct_odds(const ExistenceModel& model, MissedShare before,
                                      double before_was, float decay_per_s, double most_odds) {

@@ -17,10 +17,10 @@ constexpr double kLeastOf = 1e-3;
 constexpr double kTiny = std::numeric_limits<double>::min();
 
 constexpr std::size_t kSteps = 12;
-/// The grid closes in on the posterior so often: from all that can be to this many sigmas.
+/// The grid is narrowed to the posterior kZooms times: from the whole range to kSigmas sigmas.
 constexpr int kZooms = 5;
 constexpr double kSigmas = 4.0;
-/// Most log-odds of a v.
+/// Largest log-odds of v.
 constexpr double kMostLogOdds = 14.0;
 
 /// One axis of the grid: log-odds of v before or the logarithm of lambda.
@@ -31,7 +31,7 @@ struct Axis {
     return from + (to - from) * (static_cast<double>(step) + 0.5) / static_cast<double>(kSteps);
   }
   std::size_t steps() const { return to > from ? kSteps : 1; }
-  /// Of a cell; 1 where there is but one.
+  /// Width of a cell; 1 if there is one cell.
   double width() const { return to > from ? (to - from) / static_cast<double>(kSteps) : 1.0; }
 };
 
@@ -49,32 +49,31 @@ struct BetaPrior {
   }
 };
 
-/// Of one v: how likely it is, up to a factor that all share, and its mean.
+/// Evidence for one v, up to a common factor, and its mean.
 struct Weighed {
   double log_evidence = 0.0;
   double mean = 0.0;
 };
 
-/// Why a drive misses what it misses.
+/// Cause of a drive's misses.
 enum class Drive : std::uint8_t {
-  kAlike,   ///< As those before: v is about theirs.
-  kUnlike,  ///< As none before: v is any.
-  kHidden,  ///< v is theirs, and something hides what is looked at from one side.
+  kAlike,   ///< As on earlier drives: v is near theirs.
+  kUnlike,  ///< As on no earlier drive: v is arbitrary.
+  kHidden,  ///< v of earlier drives, and an obstacle hides points observed from one side.
 };
 
-/// v of this drive, v before, lambda, and the share of what is looked at from one side that is
-/// hidden.
+/// v of this drive, v before, lambda, and the hidden share of points observed from one side.
 using Means = std::array<double, 4>;
 
-/// Of one kind of drive: how likely that is, up to a factor, and what the rates are then.
+/// Evidence for one kind of drive, up to a factor, and the mean rates given that kind.
 struct Summed {
   double log_evidence = 0.0;
   Means means{};
 };
 
-/// What this drive's looks say of its v where v before and lambda are given: points that it sees,
-/// and those that it missed, by the probability that they are there and were looked at. Or what
-/// they say of the share that nothing hides, where v is given, too.
+/// Likelihood of this drive's v for a given v before and lambda: points that it sees, and points
+/// that it missed, by the probability that they exist and were observed. Or the likelihood of the
+/// share that is not hidden, if v is given too.
 class ThisDrive {
  public:
   void see(double points) { seen_ += points; }
@@ -90,7 +89,7 @@ class ThisDrive {
       if (points_[i] > 0.0) chances_[i] /= points_[i];
   }
 
-  /// At one v.
+  /// Log likelihood at one v.
   double log_likelihood(double v) const {
     double log = seen_ * std::log(std::max(kTiny, v));
     for (std::size_t i = 0; i < kBins; ++i)
@@ -98,7 +97,7 @@ class ThisDrive {
     return log;
   }
 
-  /// Summed up over all v.
+  /// Integral over all v.
   Weighed over(const BetaPrior& prior) const {
     const auto [mode, sigma] = peak(prior);
     const double top = log_density(prior, mode);
@@ -113,20 +112,21 @@ class ThisDrive {
   }
 
  private:
-  /// Of the chances; the first two of those below 0: seen, though part of it was hidden.
+  /// Bins of the chances; the first two are for chances below 0: points seen though part of them
+  /// was hidden.
   static constexpr std::size_t kBins = 18;
   static constexpr double kMisses = 16.0;
   static constexpr int kReach = 4;
   static constexpr int kPerSigma = 1;
 
-  /// By log-odds.
+  /// Log density as a function of the log-odds.
   double log_density(const BetaPrior& prior, double x) const {
     const double log_miss = -std::log1p(std::exp(x));
     return prior.seen * (log_miss + x) + prior.missed * log_miss +
            log_likelihood(probability_of(std::exp(x)));
   }
 
-  /// Where that is highest, by Newton's steps, and its width there.
+  /// Maximum of the density by Newton's method, and its width there.
   std::pair<double, double> peak(const BetaPrior& prior) const {
     double missed = prior.missed;
     for (std::size_t i = 2; i < kBins; ++i) missed += points_[i] * chances_[i];
@@ -154,7 +154,7 @@ class ThisDrive {
 
   double seen_ = 0.0;
   std::array<double, kBins> points_{};
-  std::array<double, kBins> chances_{};  ///< Means, when closed.
+  std::array<double, kBins> chances_{};  ///< Means after close().
 };
 
 class Posterior {
@@ -176,7 +176,7 @@ class Posterior {
     return {std::max(-kMostLogOdds, std::log(seen / (fewest + missed)) - margin),
             std::min(kMostLogOdds, std::log(seen / fewest) + margin)};
   }
-  /// From none of the missing to all of them.
+  /// From none of the missing points removed to all of them.
   Axis decay_axis() const {
     double missing = 0.0, exposure_s = exposure_s_;
     for (const AlikePoints& one : evidence_.histories) {
@@ -188,7 +188,7 @@ class Posterior {
             std::log((went_ + missing) / exposure_s_) + margin};
   }
 
-  /// Over a grid. The axes close in.
+  /// Integral over a grid. The axes are narrowed.
   Summed sum_up(Axis& before, Axis& decay) const {
     std::vector<Weighed> cells;
     cells.reserve(before.steps() * decay.steps());
@@ -241,7 +241,8 @@ class Posterior {
     return {std::max(axis.from, mean - half), std::min(axis.to, mean + half)};
   }
 
-  /// Of a history at one lambda: gone before the first miss, and there from then until now.
+  /// Probabilities of a history at one lambda: removed before the first miss, and existing from
+  /// then until now.
   struct Stay {
     double lost = 0.0;
     double later = 1.0;
@@ -255,7 +256,7 @@ class Posterior {
                        std::exp(-rate * (one.since_s - one.until_missed_s))});
     return stays;
   }
-  /// Of each history at one v before: that they all miss what is there.
+  /// For each history, at one v before: probability that all its passes miss an existing point.
   std::vector<double> missed_at(double odds) const {
     const double log_miss = -std::log1p(std::exp(odds));
     const double hidden = PassOccluder::missed_when_hidden(std::exp(log_miss));
@@ -269,7 +270,7 @@ class Posterior {
     return missed;
   }
 
-  /// One cell; all v of this drive are summed up there, or all shares that are not hidden.
+  /// One cell: the integral over all v of this drive, or over all shares that are not hidden.
   Weighed weigh(double odds, double log_decay, const std::vector<double>& all_missed,
                 const std::vector<Stay>& stays) const {
     const double log_miss = -std::log1p(std::exp(odds));
@@ -312,9 +313,9 @@ class Posterior {
     }
   }
 
-  /// Points that are seen with `chance` where nothing hides them, by the share x that nothing does:
-  /// seen or missed with chance (1 - part + part x), or not. Returns the part of the logarithm that
-  /// x is not in.
+  /// Points that are seen with `chance` when not hidden, as a function of the share x that is not
+  /// hidden: seen with chance (1 - part + part x), else missed. Returns the part of the logarithm
+  /// without x.
   static double look(ThisDrive& view, const AlikePoints& one, double chance) {
     const double part = hides_all(one.sides), rest = 1.0 - part;
     if (!one.is_seen_now) {
@@ -337,7 +338,7 @@ class Posterior {
   double exposure_s_;
 };
 
-/// Each by a grid of its own: one is narrow where the other is wide.
+/// Each kind has a grid of its own: one is narrow where the other is wide.
 Summed sum_up(const RateEvidence& evidence, const LearnedRates& until_now, Drive kind,
               bool learns_recall, bool learns_decay) {
   const Posterior posterior(evidence, kind, learns_recall ? 0.0 : until_now.now);

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kMostCounts = 1e5;
 constexpr double kLeastCount = 1e-3;
-/// A look sees what is there at most so often: nothing is certain by one miss.
+/// Upper limit of the recall of a look, so that one miss is never certain evidence.
 constexpr double kMostRecall = 0.999;
 
 }  // namespace
@@ -30,7 +30,7 @@ DetectorRecall::DetectorRecall(const Parameters& parameters)
       least_q1_(parameters.false_rate + kLeast * (1.0 - parameters.false_rate)),
       learns_(parameters.learn_recall),
       learns_passes_(parameters.learn_recall && parameters.pass_recall < 1.0) {
-  // Hits are of points and of nothing: q1 = eps + (1 - eps) p_d is what is counted.
+  // Hits include false sightings: the counts estimate q1 = eps + (1 - eps) p_d.
   const double q1 = false_rate_ + (1.0 - false_rate_) * parameters.recall;
   all_ = {parameters.recall_weight * q1, parameters.recall_weight * (1.0 - q1)};
   passes_ = {parameters.pass_recall_weight * parameters.pass_recall,

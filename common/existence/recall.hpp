@@ -1,4 +1,4 @@
-// The detector's recall, learned from points that are surely there.
+// The detector's recall, learned from points that surely exist.
 #pragma once
 
 #include <array>
@@ -8,8 +8,8 @@
 
 namespace understory::existence {
 
-/// Hits and misses with a Beta prior, forgotten beyond 1e5 (so that 1e9 of them stay numbers, and a
-/// detector may age).
+/// Hits and misses with a Beta prior, with forgetting beyond 1e5 (so that 1e9 looks keep precision,
+/// and the detector may change).
 struct BetaCounts {
   double hits = 0.0;
   double misses = 0.0;
@@ -19,33 +19,34 @@ struct BetaCounts {
 };
 
 /// Recall on two levels. A look at a visible point sees it with p_d, which depends on the range;
-/// but the looks of one pass share a cause (bark, light, the angle of the road), so a pass sees a
-/// point at all with v only. Both are learned without the bias of looking at survivors alone:
+/// but the looks of one pass share a cause (bark, light, the angle of the road), so a pass can see
+/// a point only with probability v. Both are learned without survivor bias:
 ///   - a look counts for p_d where the previous look from the same viewpoint in the same pass was a
-///     hit: chosen before its outcome is known;
-///   - a pass counts for v with the probability that the point existed then: at first what is known
-///     after the pass, later 1 where another pass has surely seen the point, 0 where it went. What
-///     was counted too early is taken back (EM). The pass that found the point does not count.
+///     hit: it is selected before its outcome is known;
+///   - a pass counts for v with the probability that the point existed then: first the probability
+///     after the pass, later 1 if another pass surely sees the point, 0 if it was removed. Earlier
+///     counts are then corrected (EM). The pass that found the point does not count.
 class DetectorRecall {
  public:
-  static constexpr std::size_t kBins = 8;  ///< Of the range, the last one open.
+  static constexpr std::size_t kBins = 8;  ///< Bins of the range, the last one unbounded.
 
   explicit DetectorRecall(const Parameters& parameters);
 
-  /// p_d at a distance [m]: the bin's own looks and, worth 20, those of all ranges.
+  /// p_d at a distance [m]: from the bin's own looks and, with the weight of 20 looks, those of all
+  /// ranges.
   double at(double distance_m) const {
     const BetaCounts& bin = bins_[bin_of(distance_m)];
     const double q1 = (bin.hits + kShared * all_mean_) / (bin.total() + kShared);
     return q1 < least_q1_ ? kLeast : (q1 - false_rate_) * inverse_;
   }
-  /// v: what it is held at, else what the counts say.
+  /// v: the value of hold(), else from the counts.
   double of_pass() const { return held_ > 0.0 ? held_ : pass_mean_; }
-  /// 0: at nothing.
+  /// Fixes v; 0: not fixed.
   void hold(double pass_recall) { held_ = pass_recall; }
   bool learns_passes() const { return learns_passes_; }
 
   void record_look(double distance_m, bool is_hit);
-  /// Changes of the counts of passes; below 0 where something is taken back.
+  /// Adds to the counts of passes; negative values correct earlier ones.
   void record_passes(double seen, double missed);
 
   /// For save and load: looks of all ranges, passes, then looks by range; see

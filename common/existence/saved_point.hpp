@@ -13,29 +13,30 @@
 
 namespace understory::existence {
 
-/// All that is kept of a point, as plain numbers without padding: the same bytes for the same
-/// point, and a point that goes on bit by bit as if nothing had been.
+/// The complete state of a point as plain numbers without padding: equal points have equal bytes,
+/// and a restored point continues bit by bit as if it had not been saved.
 template <Shell S>
 struct SavedPoint {
-  /// Version 1 had a coarser 1 - v, and nothing of what was measured in front of the point; 2 not
-  /// from where a pass had seen it, nor what may hide it; 3 counted hidden passes with the others.
+  /// Version 1 had a coarser 1 - v and no returns in front of the point; version 2 lacked the
+  /// sectors of sightings and the hidden share; version 3 counted hidden passes with the others.
   static constexpr std::uint32_t kVersion = 4;
   static constexpr std::size_t kFloats = 8;
   std::uint32_t version = kVersion;
   std::uint32_t shell_kind = S::kKind;
-  double odds = 0.0;  ///< P / (1 - P), of the pass that is open.
-  /// Number of the pass, sectors and flags; a fourth one, 0, where the size would not divide by 8.
+  double odds = 0.0;  ///< P / (1 - P) in the open pass.
+  /// Number of the pass, sectors and flags; and a fourth value 0 if the size were not a multiple of
+  /// 8.
   std::array<std::uint32_t, 3 + (3 + kFloats + S::kNumbers) % 2> pass{};
-  std::array<float, kFloats> numbers{};  ///< Of the pass; see PointExistence.
+  std::array<float, kFloats> numbers{};  ///< Numbers of the pass; see PointExistence.
   std::array<float, S::kNumbers> shell{};
 
-  /// Whether it is of a version and a shell that are known, and its numbers are possible.
+  /// Whether version and shell are known and the numbers are possible.
   bool can_be() const {
     const auto is_possible = [](double number) { return std::isfinite(number) && number >= 0.0; };
     return version >= 1 && version <= kVersion && shell_kind == S::kKind && is_possible(odds) &&
            std::all_of(numbers.begin(), numbers.end(), is_possible);
   }
-  /// A number that holds two: 8 bits above 16.
+  /// A number with two values: 8 bits above 16.
   std::uint32_t packed(std::size_t number) const {
     return static_cast<std::uint32_t>(std::min(16777215.0F, numbers[number]));
   }

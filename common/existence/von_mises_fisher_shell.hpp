@@ -12,17 +12,16 @@
 
 namespace understory::existence {
 
-/// K lobes, each with mean direction and concentration (both from the sum of the directions that it
-/// was looked at from), log-odds of the visibility and reach. Between lobes both functions are
-/// their mean, weighted by the lobes' densities; far from all lobes they are what they were at
-/// first.
+/// K lobes, each with mean direction and concentration (both from the sum of the directions of its
+/// looks), log-odds of the visibility and reach. Between lobes both functions are their mean,
+/// weighted by the lobes' densities; far from all lobes they have their start values.
 template <std::size_t K>
 requires(K > 0 && K < 24) class VonMisesFisherShell {
  public:
   /// Shares of a direction in each lobe; `nearest` of them.
   struct Place {
     std::array<float, K> shares{};
-    float squares = 0.0F;  ///< Sum of the squared shares.
+    float squares = 0.0F;  ///< Sum of squared shares.
     std::size_t nearest = 0;
     Eigen::Vector3f direction;
     bool is_new = false;  ///< No lobe is near: the next multiply() begins one.
@@ -70,8 +69,8 @@ requires(K > 0 && K < 24) class VonMisesFisherShell {
     return static_cast<int>(place.is_new ? used() : place.nearest);
   }
 
-  /// The lobes change by the least squares that give the ratio at the place itself; the nearest one
-  /// takes the direction into its mean.
+  /// Changes the lobes by least squares so that the place itself gets the ratio; the nearest lobe
+  /// includes the direction in its mean.
   void multiply(Place& place, float ratio, float most_odds) {
     if (place.is_new) place = begin_lobe(place.direction);
     Lobe& nearest = lobes_[place.nearest];
@@ -134,27 +133,28 @@ requires(K > 0 && K < 24) class VonMisesFisherShell {
     return true;
   }
 
-  std::size_t lobes() const { return used_; }  ///< In use.
+  std::size_t lobes() const { return used_; }  ///< Number of lobes in use.
 
  private:
   struct Lobe {
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();  ///< Of the directions, each of length 1.
-    float looks = 0.0F;                             ///< How many.
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();  ///< Sum of the directions, each of length 1.
+    float looks = 0.0F;                             ///< Number of directions.
     float log_odds = 0.0F;
-    float before = 0.0F;  ///< log_odds when the pass began.
+    float before = 0.0F;  ///< log_odds at the begin of the pass.
     float reach_m = 0.0F;
   };
   static constexpr float kFarShare =
       0.05F;  ///< Density of "no lobe"; a lobe's own is 1 at its mean.
-  static constexpr float kNearDensity = 0.25F;   ///< Below it a direction is another lobe's.
-  static constexpr float kLeastSquares = 0.04F;  ///< Farther from all lobes they learn less.
-  static constexpr float kMostLooks = 1e4F;      ///< The mean stays where 1e4 looks put it.
+  static constexpr float kNearDensity = 0.25F;  ///< Below it a direction starts a new lobe.
+  /// Lower limit of `squares`: far from all lobes they learn less.
+  static constexpr float kLeastSquares = 0.04F;
+  static constexpr float kMostLooks = 1e4F;  ///< Limit of the looks in the mean.
   static constexpr float kLeastLogOdds = -39.0F;
 
   std::size_t used() const { return used_; }
 
-  /// exp(kappa (u m - 1)). The concentration is the one at which directions spread as far as the
-  /// lobe's (Banerjee et al. 2005), between 4 (40 degrees) and 20 (18 degrees).
+  /// exp(kappa (u m - 1)). The concentration matches the spread of the lobe's directions (Banerjee
+  /// et al. 2005), between 4 (40 degrees) and 20 (18 degrees).
   static float density(const Lobe& lobe, const Eigen::Vector3f& direction) {
     const float length = lobe.sum.norm();
     const float mean = std::min(length / lobe.looks, 0.999F);

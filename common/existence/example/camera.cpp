@@ -1,8 +1,8 @@
-// How a visual SLAM keeps its map true: one page, Eigen alone.
+// Example: existence of map points in a visual SLAM; one page, Eigen alone.
 //   existence-camera
 // A camera drives past a wall with 200 keypoints. It comes back a month later: a quarter of the
-// wall was repainted, and a van hides another quarter. What was repainted goes, what is hidden
-// stays.
+// wall was repainted, and a van hides another quarter. Repainted points are removed, hidden points
+// stay.
 #include <cstdio>
 #include <random>
 #include <vector>
@@ -14,7 +14,7 @@ using namespace understory::existence;
 
 namespace {
 
-/// A map point of the SLAM, with its existence beside it.
+/// A map point of the SLAM and its existence.
 struct MapPoint {
   Eigen::Vector3f position_m;
   PointExistence<IcosahedralShell> existence;
@@ -26,8 +26,8 @@ bool is_in_frustum(const Eigen::Vector3f& camera_m, const Eigen::Vector3f& point
   return ray.y() > 0.5F && std::abs(ray.x()) < ray.y() && std::abs(ray.z()) < 0.75F * ray.y();
 }
 
-/// One drive past the wall, three times beside each other. `matches(i)`: did the tracker match map
-/// point i in this frame? In a SLAM that is the answer of its descriptor matching.
+/// One drive past the wall on three parallel tracks. `matches(i)`: whether the tracker matched map
+/// point i in this frame; in a SLAM this is the result of descriptor matching.
 template <typename Matches>
 void drive_past(ExistenceModel& model, std::vector<MapPoint>& map, const Matches& matches) {
   model.begin_pass();
@@ -53,7 +53,7 @@ int main() {
   std::uniform_real_distribution<float> unit(0.0F, 1.0F);
   Parameters parameters;
   parameters.range_m = 30.0;
-  parameters.decay_per_s = 1e-7;  // one point in a hundred a day
+  parameters.decay_per_s = 1e-7;  // 1 % of the points per day
   ExistenceModel model(parameters);
 
   // The SLAM triangulates its points: each is born at its first sighting.
