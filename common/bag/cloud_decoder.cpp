@@ -67,8 +67,8 @@ double time_unit(double spread, FieldType type) {
 struct CloudDecoder::RawPoint {
   Eigen::Vector3f position_m;
   double time = 0.0;  ///< Time in the field's unit.
-  std::int64_t ticks =
-      0;  ///< The same for an integer field: nanoseconds since 1970 do not fit into a double.
+  /// The same for an integer field: nanoseconds since 1970 do not fit into a double.
+  std::int64_t ticks = 0;
   std::uint32_t ring = 0;
   double intensity = 0.0;
 };

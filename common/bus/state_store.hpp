@@ -105,8 +105,8 @@ class StateStore {
   int lock_ = -1;
   std::uint64_t journal_bytes_ = 0;
   bool journal_broken_ = false;
-  bool is_behind_hole_ =
-      false;  ///< Inputs before this journal are lost; only a snapshot completes the state.
+  /// Inputs before this journal are lost; only a snapshot completes the state.
+  bool is_behind_hole_ = false;
 };
 
 }  // namespace understory::bus

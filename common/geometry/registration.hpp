@@ -85,8 +85,8 @@ Registration register_points(std::span<const UncertainPoint> reference,
 /// Uncertainty of the motion between two observations when no odometry measures it.
 struct StepModel {
   double sigma_m = 0.3;  ///< Standard deviation of the translation, per axis.
-  double sigma_rad =
-      0.04;  ///< Standard deviation of the rotation; also the step width of the search.
+  /// Standard deviation of the rotation; also the step width of the search.
+  double sigma_rad = 0.04;
   double max_rotation_rad = 0.5;  ///< Largest rotation that is searched, to either side.
   /// Least number of pairs of a searched rotation. Four points fit one of 27 rotations by chance.
   std::size_t min_searched_pairs = 8;

@@ -23,7 +23,7 @@ class SparseCholesky {
   SparseCholesky(SparseCholesky&&) noexcept;
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
-  /// The ordering is kept as long as the pattern is the same. Returns -1, or the column at which
+  /// The ordering is reused while the pattern stays the same. Returns -1, or the column at which
   /// the matrix is not positive definite.
   int factorise(const SymmetricSparse& matrix);
   /// Solves for one or more right-hand sides; after a successful factorise().

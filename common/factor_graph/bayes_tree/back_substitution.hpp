@@ -1,4 +1,4 @@
-// Back-substitution, as far down the tree as something changes.
+// Back-substitution down the tree, as far as values change.
 #pragma once
 
 #include <span>
@@ -11,19 +11,19 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Solves for the variables' moves from given cliques downwards and moves them in the graph. Keeps
-/// its scratch memory between calls; its only result is the log of the last solve.
+/// Solves for the variables' changes from given cliques downwards and applies them to the graph.
+/// Keeps its scratch memory between calls; its only result is the log of the last solve.
 class BackSubstitution {
  public:
-  /// Works on these two, which must outlive it.
+  /// Both references must outlive it.
   BackSubstitution(graph::FactorGraph& graph, const CliqueTree& cliques)
       : graph_(graph), cliques_(cliques), kernel_(front_kernel()) {}
 
-  /// Solves `computed` (children first) and what lies below, as long as it changes or, where
-  /// `is_whole`, all of it. A variable that would move by less than `threshold` of its own
-  /// conditional standard deviation stays.
+  /// Solves `computed` (children first) and the cliques below while values change, or all of them
+  /// if `is_whole`. A variable that would move by less than `threshold` of its own conditional
+  /// standard deviation stays.
   void solve(std::span<const int> computed, double threshold, bool is_whole);
-  /// What the last solve moved.
+  /// Variables moved by the last solve.
   const MoveLog& moves() const { return moves_; }
 
  private:
@@ -36,7 +36,7 @@ class BackSubstitution {
   const CliqueTree& cliques_;
   FrontKernel kernel_;
   std::vector<char> is_computed_;  ///< Per clique: solved in any case; zero between calls.
-  std::vector<double> step_;       ///< One clique's rows.
+  std::vector<double> step_;       ///< Rows of one clique.
   std::vector<int> stack_;         ///< Cliques still to be solved.
   MoveLog moves_;
 };

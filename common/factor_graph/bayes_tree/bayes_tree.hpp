@@ -26,28 +26,28 @@ class BayesTree {
   /// CliqueTree.
   explicit BayesTree(graph::FactorGraph& graph, std::size_t undo_bytes = kUndoBytes);
 
-  /// The variable's clique and all above it will be built anew.
+  /// Marks the variable's clique and all above it to be built again.
   void mark_structure(int variable);
-  /// The factor's clique and all above it will be computed anew.
+  /// Marks the factor's clique and all above it to be computed again.
   void mark_numbers(int factor);
-  /// Everything will be built anew.
+  /// Marks everything to be built again.
   void mark_everything();
-  /// Takes a factor out of its clique, which is marked.
+  /// Removes a factor from its clique and marks the clique.
   void detach(int factor);
 
   /// Brings the marked part up to date. `fresh`: factors that no clique holds yet. `last`:
   /// variables to be eliminated as late as possible. Gives its floating-point operations.
   double eliminate(std::span<const int> fresh, std::span<const int> last);
 
-  /// Back-substitution from the cliques that eliminate() computed, on as long as something changes.
-  /// Moves the graph's variables; what would move by less than `threshold` [own conditional
+  /// Back-substitution from the cliques that eliminate() computed, while values change. Moves the
+  /// graph's variables; a variable that would move by less than `threshold` [own conditional
   /// standard deviations] stays.
   void solve(double threshold) { back_substitution_.solve(computed_, threshold, false); }
-  /// Likewise, through the whole tree.
+  /// The same through the whole tree.
   void solve_everything(double threshold);
   /// Variables that the last solve moved, each once.
   const std::vector<int>& changed() const { return back_substitution_.moves().variables(); }
-  /// Where each of changed() was before.
+  /// Earlier value of each of changed().
   const std::vector<graph::Delta>& changed_from() const {
     return back_substitution_.moves().from();
   }
@@ -67,10 +67,10 @@ class BayesTree {
   /// Floating-point operations of one factorisation of the whole tree.
   double total_flops() const { return cliques_.total_flops(); }
 
-  /// Makes all changes final. `is_whole`: no factor of the graph waits for eliminate().
+  /// Makes all changes final. `is_whole`: all factors of the graph are eliminated.
   void commit(bool is_whole);
-  /// Restores the state of the last commit(), exactly; costs what changed. The graph must be the
-  /// one of then already.
+  /// Restores the state of the last commit() exactly, at the cost of the changes. The graph must be
+  /// restored before.
   void rollback();
 
  private:

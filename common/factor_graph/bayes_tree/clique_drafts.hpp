@@ -1,4 +1,4 @@
-// From an elimination order to cliques.
+// Makes cliques from an elimination order.
 #pragma once
 
 #include <span>
@@ -26,7 +26,7 @@ struct CliquePlan {
 };
 
 /// Symbolic elimination in a given order: finds each variable's separator, and merges a clique into
-/// its parent where that saves time. Keeps its scratch memory.
+/// its parent if that saves time. Keeps its scratch memory.
 class CliqueDrafts {
  public:
   /// Drafts cliques for the variables in this order, which must outlive write().
@@ -38,13 +38,13 @@ class CliqueDrafts {
 
  private:
   struct Draft {
-    int first_frontal = 0, last_frontal = 0;  ///< Positions, list through next_frontal_.
+    int first_frontal = 0, last_frontal = 0;  ///< Positions; a list through next_frontal_.
     int frontal_count = 0;
     int pivots = 0;
-    int first_separator = 0;  ///< In separators_.
+    int first_separator = 0;  ///< Index in separators_.
     int separator_count = 0;
     int separator_size = 0;
-    int next = -1;      ///< Among the children of one parent.
+    int next = -1;      ///< Next child of the same parent.
     bool alive = true;  ///< Not merged into its parent.
   };
 
@@ -53,11 +53,11 @@ class CliqueDrafts {
   void merge_children(int position, int first_child);
   void append(const Draft& draft, std::span<const int> order);
 
-  std::vector<int> positions_;      ///< Of each variable.
-  std::vector<int> first_element_;  ///< At each position.
-  std::vector<int> marker_;         ///< At each position: the last one tied to it.
-  std::vector<Draft> drafts_;       ///< At each position.
-  std::vector<int> children_;       ///< At each position: first child draft.
+  std::vector<int> positions_;      ///< Position of each variable.
+  std::vector<int> first_element_;  ///< First element at each position.
+  std::vector<int> marker_;         ///< For each position: the last position connected to it.
+  std::vector<Draft> drafts_;       ///< Draft at each position.
+  std::vector<int> children_;       ///< For each position: first child draft.
   std::vector<int> next_frontal_;
   std::vector<int> separators_;  ///< Positions.
   CliquePlan plan_;

@@ -1,4 +1,4 @@
-// In which order to eliminate variables, and which of them together.
+// Order of elimination, and the sets of variables eliminated together.
 #pragma once
 
 #include <span>
@@ -10,8 +10,8 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Plans the elimination of a set of variables that elements (factors, separators of subtrees) tie
-/// together. Variables are numbered from 0 in the order of their dimensions. Keeps its scratch
+/// Plans the elimination of a set of variables connected by elements (factors, separators of
+/// subtrees). Variables are numbered from 0 in the order of their dimensions. Keeps its scratch
 /// memory.
 class CliquePlanner {
  public:
@@ -24,12 +24,12 @@ class CliquePlanner {
   /// The variable is to be eliminated after all others.
   void set_last(int variable) { problem_.set_last(variable); }
 
-  /// Orders by exact minimum degree, many variables by constrained COLAMD (those of set_last()
-  /// after all others, their neighbours just before: the next update will most likely touch these),
-  /// finds what each variable is tied to when it is eliminated, and merges cliques where that saves
-  /// time. Where the result costs more than 5 Mflop it computes a nested dissection, too (of all
-  /// but those of set_last()), and takes the order that costs less. The plan is valid until the
-  /// next clear().
+  /// Orders by exact minimum degree, or by constrained COLAMD for many variables (variables of
+  /// set_last() after all others, their neighbours just before: the next update will probably
+  /// change these). Finds the separator of each variable, and merges cliques if that saves time. If
+  /// the result costs more than 5 Mflop, a nested dissection (of all variables but those of
+  /// set_last()) is computed too, and the cheaper order is used. The plan is valid until the next
+  /// clear().
   const CliquePlan& plan();
 
  private:

@@ -1,4 +1,4 @@
-// What cliques hand to their parents.
+// Contributions of cliques to their parents.
 #pragma once
 
 #include <cstddef>
@@ -9,16 +9,16 @@
 namespace understory::factor_graph::bayes_tree {
 
 /// Owns the contributions of cliques, by number: Schur complements on their separators, lower
-/// triangles column by column. Each is there or not, which is no part of the tree's state: it can
+/// triangles column by column. Whether one is stored is no part of the tree's state, because it can
 /// be computed again.
 class Contributions {
  public:
-  /// That of the clique; null where it is not there.
+  /// Contribution of the clique; null = not stored.
   const double* find(int clique) const {
     const auto at = static_cast<std::size_t>(clique);
     return at < blocks_.size() ? blocks_[at].numbers : nullptr;
   }
-  /// Memory for that of the clique, with so many numbers; in place of one that is there.
+  /// Memory for the clique's contribution of `count` numbers; it replaces a stored one.
   double* make(int clique, std::size_t count) {
     const auto at = static_cast<std::size_t>(clique);
     if (at >= blocks_.size()) blocks_.resize(at + 1);
@@ -29,7 +29,7 @@ class Contributions {
     }
     return block.numbers;
   }
-  /// Gives that of the clique up, if it is there.
+  /// Drops the clique's contribution, if stored.
   void drop(int clique) {
     if (find(clique) == nullptr) return;
     Block& block = blocks_[static_cast<std::size_t>(clique)];

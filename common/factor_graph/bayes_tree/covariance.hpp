@@ -1,4 +1,4 @@
-// Covariances, along the paths from the variables' cliques to the root.
+// Covariances by the paths from the variables' cliques to the root.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,12 +15,12 @@ namespace understory::factor_graph::bayes_tree {
 /// state.
 class Covariance {
  public:
-  /// Works on these two, which must outlive it.
+  /// Both references must outlive it.
   Covariance(const graph::FactorGraph& graph, const CliqueTree& cliques)
       : graph_(graph), cliques_(cliques) {}
 
   /// Joint covariance of the variables in the order given, each in its chart (see graph::Delta).
-  /// None where one is not in the tree or the measurements leave one undetermined. Costs one
+  /// None where a variable is not in the tree or not determined by the measurements. Costs one
   /// triangular solution along the paths to the root.
   std::optional<Eigen::MatrixXd> joint(std::span<const int> variables);
 
@@ -33,7 +33,7 @@ class Covariance {
 
   const graph::FactorGraph& graph_;
   const CliqueTree& cliques_;
-  std::vector<int> found_;        ///< Cliques of the paths as they were found.
+  std::vector<int> found_;        ///< Cliques of the paths in the order of finding.
   std::vector<int> path_;         ///< The same, children first.
   std::vector<char> is_on_path_;  ///< Per clique; zero between calls.
   std::vector<int> pending_;      ///< Per clique: children not yet in `path_`; zero between calls.

@@ -6,10 +6,10 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Variables that are tied together, one set behind the other: element e is
-/// entries[starts[e]] .. entries[starts[e + 1]], the last one ends with `entries`.
+/// Sets of connected variables in one list: element e is entries[starts[e]] .. entries[starts[e +
+/// 1]], the last set ends with `entries`.
 struct ElementLists {
-  std::span<const int> starts;   ///< First place of each element.
+  std::span<const int> starts;   ///< First index of each element.
   std::span<const int> entries;  ///< Variables.
 
   /// Variables of one element.
@@ -18,11 +18,10 @@ struct ElementLists {
   int count() const { return static_cast<int>(starts.size()); }
 };
 
-/// Order in which to eliminate 0 .. count - 1: what a small separator divides comes before the
-/// separator (George 1973), by METIS's multilevel bisection (Karypis and Kumar 1998).
-/// `number_of`: of each variable among them, negative where it is not one of them. Empty where
-/// METIS fails. The same answer every time, whatever other threads do. Costs about 5 us per
-/// variable.
+/// Order in which to eliminate 0 .. count - 1: the parts divided by a small separator come before
+/// the separator (George 1973), by METIS's multilevel bisection (Karypis and Kumar 1998).
+/// `number_of`: number of each variable in this set, negative = not in the set. Empty where METIS
+/// fails. The result is deterministic, independent of other threads. Costs about 5 us per variable.
 std::vector<int> dissect(const ElementLists& elements, std::span<const int> number_of, int count);
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -1,4 +1,4 @@
-// The numbers of the tree: dense fronts, assembled and factorised.
+// Computes the numbers of the tree: dense fronts, assembled and factorised.
 #pragma once
 
 #include <span>
@@ -16,17 +16,17 @@ namespace understory::factor_graph::bayes_tree {
 /// calls; holds no state.
 class Elimination {
  public:
-  /// Works on these two, which must outlive it.
+  /// Both references must outlive it.
   Elimination(const graph::FactorGraph& graph, CliqueTree& cliques)
       : graph_(graph), cliques_(cliques), kernel_(front_kernel()) {}
 
   /// Lists the cliques whose numbers alone are marked, children first.
   void list_dirty(const Marks& marks, std::vector<int>& computed);
-  /// Computes these cliques' columns of L; all below them must be up to date or among them. What a
-  /// clique hands to its parent stays only where computing it again would take long for its size.
+  /// Computes these cliques' columns of L; all cliques below them must be up to date or among them.
+  /// A clique's contribution is stored only if computing it again would take long for its size.
   void factorise(std::span<const int> cliques);
   /// Computes the numbers that a rollback could not restore: from the same factors by the same
-  /// operations, so that they are the same. The graph must be the one of then.
+  /// operations, so that the numbers are the same. The graph must be restored before.
   void restore_lost();
 
  private:
@@ -51,7 +51,7 @@ class Elimination {
   std::vector<double> numbers_;  ///< One front: size x size, column-major, lower triangle.
   double* front_ = nullptr;
   std::vector<int> offset_;    ///< Per variable of the graph: its first row.
-  std::vector<double> least_;  ///< Per pivot: at or below this it has no information.
+  std::vector<double> least_;  ///< Per pivot: limit at or below which it has no information.
   std::vector<int> left_out_;
   std::vector<RowRun> runs_;
   std::vector<int> targets_;  ///< Rows of one factor's columns.

@@ -1,4 +1,4 @@
-// Variables to be eliminated and what ties them together.
+// Variables to be eliminated and their connections.
 #pragma once
 
 #include <algorithm>
@@ -10,12 +10,12 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Floating-point operations of eliminating so many pivots from a front with so many rows more.
+/// Floating-point operations for eliminating `pivots` from a front with `rest` more rows.
 constexpr double elimination_flops(double pivots, double rest) {
   return pivots * (pivots * pivots / 3.0 + pivots * rest + rest * rest);
 }
 
-/// Time of one front [us], fitted to the kernel: overhead, moving its numbers, eliminating.
+/// Time of one front [us], fitted to the kernel: overhead, memory transfer, elimination.
 constexpr double front_time_us(double pivots, double separator) {
   const double size = pivots + separator + 1.0;
   return 0.25 + 0.0006 * size * size + 0.00015 * elimination_flops(pivots, separator + 1.0);
@@ -40,7 +40,8 @@ class EliminationProblem {
   void add_to_element(int variable) { entries_.push_back(variable); }
   /// Puts the variable into the last group.
   void set_last(int variable) { group_[static_cast<std::size_t>(variable)] = kLast; }
-  /// Puts the others that share an element with one of the last group into the group before it.
+  /// Puts other variables that share an element with one of the last group into the group before
+  /// it.
   void find_neighbours();
 
   /// Number of variables.
@@ -49,7 +50,7 @@ class EliminationProblem {
   int dimension(int variable) const { return dimensions_[static_cast<std::size_t>(variable)]; }
   /// Group of a variable.
   int group(int variable) const { return group_[static_cast<std::size_t>(variable)]; }
-  /// Groups of all variables, as CCOLAMD takes them.
+  /// Groups of all variables, in the form of CCOLAMD.
   std::vector<int>& groups() { return group_; }
   /// Number of elements.
   int element_count() const { return static_cast<int>(element_starts_.size()); }
@@ -57,9 +58,9 @@ class EliminationProblem {
   ElementLists elements() const { return {element_starts_, entries_}; }
   /// The variables of one element.
   std::span<const int> element(int number) const { return elements()[number]; }
-  /// The variables of all elements, one element behind the other.
+  /// The variables of all elements, element after element.
   std::span<const int> entries() const { return entries_; }
-  /// Cost in any order: of eliminating the largest element.
+  /// Lower bound of the cost in any order: elimination of the largest element.
   double least_flops() const;
 
  private:

@@ -1,4 +1,4 @@
-// Which clique assembles each factor.
+// The clique that assembles each factor.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Where a factor is: its clique, and the index in that clique's list.
+/// Place of a factor: its clique, and the index in that clique's list.
 struct FactorPlace {
   int clique = graph::kNone;
   int at = 0;
@@ -16,16 +16,16 @@ struct FactorPlace {
   friend bool operator==(const FactorPlace&, const FactorPlace&) = default;
 };
 
-/// The places of all factors, with undo. Beside their records and not in them: an update changes
-/// the places of thousands, and a place is a sixteenth of a record (docs/decisions/152). No
-/// JournaledTable: that one gives out numbers, and clears what it gives out again.
+/// The places of all factors, with undo. Not in the factors' records, because an update changes
+/// thousands of places, and a place has a sixteenth of the size of a record (docs/decisions/152).
+/// Not a JournaledTable, which assigns numbers and clears reused ones.
 class FactorPlaces {
  public:
-  /// Place of a factor; of one that no clique has ever held, none.
+  /// Place of a factor; none if it never had a clique.
   FactorPlace operator[](int factor) const {
     return is_known(factor) ? places_[static_cast<std::size_t>(factor)] : FactorPlace{};
   }
-  /// Puts a factor elsewhere.
+  /// Sets the place of a factor.
   void put(int factor, const FactorPlace& place) {
     while (!is_known(factor)) {
       places_.push_back({});
@@ -44,7 +44,7 @@ class FactorPlaces {
     saved_.clear();
     ++epoch_;
   }
-  /// Restores the places of the last commit(); costs what changed.
+  /// Restores the places of the last commit(); at the cost of the changes.
   void rollback() {
     for (std::size_t i = 0; i < saved_.size(); ++i)
       places_[static_cast<std::size_t>(saved_[i].factor)] = saved_[i].place;
@@ -59,8 +59,8 @@ class FactorPlaces {
   bool is_known(int factor) const { return static_cast<std::size_t>(factor) < places_.size(); }
 
   storage::BlockList<FactorPlace> places_;      ///< By factor.
-  storage::BlockList<std::uint64_t> saved_at_;  ///< Epoch in which each was saved last.
-  storage::BlockList<Saved> saved_;             ///< What was changed since the last commit.
+  storage::BlockList<std::uint64_t> saved_at_;  ///< Epoch of each place's last save.
+  storage::BlockList<Saved> saved_;             ///< Changes since the last commit.
   std::uint64_t epoch_ = 1;
 };
 

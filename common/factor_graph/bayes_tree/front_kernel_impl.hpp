@@ -1,5 +1,5 @@
 // The front kernel, written once for every width of vector registers. Included by the files that
-// are compiled for one kind of processor each: nothing here may be visible outside.
+// are compiled for one kind of processor each: nothing here may be visible in other files.
 #pragma once
 
 #include <cmath>
@@ -50,7 +50,7 @@ inline void update_row(double* front, long ld, long i, long j, long depth) {
   for (int c = 0; c < columns; ++c) front[(j + c) * ld + i] -= sum[c];
 }
 
-/// All rows from j on of `columns` columns. What it writes above the diagonal is never read.
+/// Updates all rows from j of `columns` columns. Values above the diagonal are never read.
 template <int width, int columns>
 inline void update_columns(double* front, long ld, long j, long depth) {
   long i = j;
@@ -82,7 +82,7 @@ inline void update_some(double* front, long ld, long j, long count, long depth) 
   update_columns<width, most>(front, ld, j, depth);
 }
 
-/// Columns j .. j + count of L, from what the columns before left of them.
+/// Factorises columns j .. j + count, already updated by the columns before.
 inline int factorise_columns(double* front, long ld, long j, long count, const double* least,
                              int* left_out) {
   int bad = 0;
@@ -90,7 +90,7 @@ inline int factorise_columns(double* front, long ld, long j, long count, const d
     double* column = front + c * ld;
     const double pivot = column[c];
 
-    // A pivot that is too small leaves its column out.
+    // A column with too small a pivot is left out.
     if (!(pivot > least[c])) {
       left_out[bad++] = static_cast<int>(c);
       for (long i = c; i < ld; ++i) column[i] = 0.0;
@@ -103,7 +103,7 @@ inline int factorise_columns(double* front, long ld, long j, long count, const d
     column[c] = root;
     for (long i = c + 1; i < ld; ++i) column[i] *= inverse;
 
-    // The column updates those that come after it.
+    // The column updates the later columns.
     for (long other = c + 1; other < j + count; ++other) {
       double* to = front + other * ld;
       const double factor = column[other];
@@ -113,7 +113,7 @@ inline int factorise_columns(double* front, long ld, long j, long count, const d
   return bad;
 }
 
-/// `panel`: columns at once; as many as the accumulators of a tile leave room for.
+/// `panel`: columns at once, limited by the accumulators of a tile.
 template <int width, int panel>
 int partial_cholesky(double* front, int size, int pivots, const double* least, int* left_out) {
   constexpr long kColumns = panel;
@@ -142,7 +142,7 @@ inline void add_numbers(double* to, const double* from, int count) {
   if (i < count) to[i] += from[i];
 }
 
-/// One run's columns and another run's rows. `from`: the first of these columns, its row 0.
+/// Adds one run's columns and another run's rows. `from`: the first of these columns, its row 0.
 template <int width>
 inline void add_block(double* front, long ld, const double* from, int rest, const RowRun& columns,
                       const RowRun& rows) {
@@ -153,7 +153,7 @@ inline void add_block(double* front, long ld, const double* from, int rest, cons
     if (is_below) {
       add_numbers<width>(to + c * ld, from, rows.length);
     } else {
-      // The parent has these in another order: the upper triangle's other half.
+      // The parent has these rows and columns in reverse order: write the transposed element.
       for (int r = 0; r < rows.length; ++r) to[r * ld + c] += from[r];
     }
     from += rest - 1 - (columns.from + c);
@@ -163,7 +163,7 @@ inline void add_block(double* front, long ld, const double* from, int rest, cons
 template <int width>
 void add_runs(double* front, int size, const double* contribution, int rest, const RowRun* runs,
               int run_count) {
-  const double* from = contribution;  // a column's row 0; what is above the diagonal is not read
+  const double* from = contribution;  // a column's row 0; values above the diagonal are not read
   const long ld = size;
   for (int a = 0; a < run_count; ++a) {
     const RowRun columns = runs[a];

@@ -1,4 +1,4 @@
-// The least-squares solution of a factor graph, kept up to date at the cost of what changed.
+// The least-squares solution of a factor graph, updated at the cost of the changes.
 #pragma once
 
 #include <optional>
@@ -13,28 +13,28 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// What an update found. An update never throws for what was measured; see `undetermined`.
+/// Result of an update. An update never throws because of measurements; see `undetermined`.
 struct IncrementalUpdate {
   bool ok = true;  ///< False: variables are undetermined.
-  /// Variables that the measurements leave undetermined; they stay where they are.
+  /// Variables that the measurements do not determine; their estimates stay.
   std::vector<graph::VariableId> undetermined;
-  std::string error;              ///< Names them.
+  std::string error;              ///< Message with their names.
   int iterations = 0;             ///< Steps of linearisation, elimination and solution.
   long relinearised_factors = 0;  ///< Factors linearised again.
   double flops = 0.0;             ///< Floating-point operations of the eliminations.
-  double deviation = 0.0;         ///< Largest one left between factor and linearisation [sigmas].
-  bool is_settled = false;        ///< See settle().
+  double deviation = 0.0;   ///< Largest remaining one between factor and linearisation [sigmas].
+  bool is_settled = false;  ///< See settle().
 };
 
 /// Incremental smoother. Variables and factors are added and removed at any time; update() brings
 /// the estimates up to date. Wrong arguments throw std::invalid_argument.
 ///
-/// Undo: rollback() takes everything back that happened since checkpoint(), or, where there was
-/// none, since before the changes that the last update() took in: estimates, factors, structure and
-/// numbers are exactly those of then. It costs what had changed.
+/// Undo: rollback() restores the state at checkpoint() or, without one, before the changes of the
+/// last update(): estimates, factors, structure and numbers are exactly the same. It costs what had
+/// changed.
 ///
 /// More than 20 functions because it is the facade of graph and tree: half of them are overloads
-/// and accessors that pass on.
+/// and accessors.
 class IncrementalSmoother {
  public:
   explicit IncrementalSmoother(const IncrementalParameters& parameters = {});
@@ -47,13 +47,13 @@ class IncrementalSmoother {
     begin_change();
     return graph_.add(initial);
   }
-  /// A new estimate of a variable that has no factor, as if it were a new variable. Throws
-  /// std::invalid_argument where it has one, or where the estimate is not finite.
+  /// Gives a variable without factors a new estimate, like a new variable. Throws
+  /// std::invalid_argument where it has a factor, or where the estimate is not finite.
   void restart(graph::VariableId id, const graph::Value& initial);
-  /// To be called where a far stronger factor of a variable was removed than it has now: it may be
-  /// determined by much less then.
+  /// Call it after a factor of a variable was removed that was far stronger than its remaining
+  /// ones: much less information may then count as determining it.
   void renew_scale(graph::VariableId id) { begin_change(), graph_.renew_scale(index(id)); }
-  /// Adds a measurement; see FactorGraph::add() for what it must fulfil.
+  /// Adds a measurement; see FactorGraph::add() for its requirements.
   graph::FactorId add(const graph::Factor& factor) {
     return begin_change(), keep(graph_.add(factor));
   }
@@ -71,20 +71,21 @@ class IncrementalSmoother {
   /// Removes a variable with all its factors.
   void remove(graph::VariableId id);
 
-  /// The next changes will be of this variable and of what its factors tie it to: they are
-  /// eliminated last, wherever else the graph is changed meanwhile. Where nothing is expected, that
-  /// is what the new factors tie together.
+  /// Announces that the next changes affect this variable and its neighbours: these are eliminated
+  /// last, whatever else changes meanwhile. Without this call, the variables of the new factors are
+  /// eliminated last.
   void expect_changes_at(graph::VariableId id) { pending_.expected = index(id); }
-  /// Takes the changes in. At most about one factorisation's work: what is left over is done by the
-  /// next updates.
+  /// Applies the changes. Costs about one factorisation at most; the next updates do the remaining
+  /// work.
   IncrementalUpdate update();
-  /// Whole steps, each on linearisations made at its start, until one changes the loss by less than
-  /// 1e-5 of it: then `is_settled`. O(graph) each, as of one factorisation.
+  /// Makes complete steps, each with linearisations from its start, until a step changes the loss
+  /// by less than a fraction of 1e-5: then `is_settled`. Each step costs one factorisation,
+  /// O(graph).
   IncrementalUpdate settle(int max_updates = 20);
-  /// Orders and factorises everything anew, linearised at the estimates, and iterates.
+  /// Orders and factorises the whole graph again, linearised at the estimates, and iterates.
   IncrementalUpdate update_everything();
 
-  /// Remembers the state as it is.
+  /// Saves the present state for rollback().
   void checkpoint();
   /// Restores the state of the checkpoint, see above.
   void rollback();
@@ -103,12 +104,12 @@ class IncrementalSmoother {
   std::span<const int> moved() const { return moved_; }
 
   /// Joint covariance in the order given: poses perturbed on the right, in their own frames [m,
-  /// rad]. None where a variable has no factor or is not determined. Costs what the paths to the
-  /// root cost.
+  /// rad]. None where a variable has no factor or is not determined. Costs one solution along the
+  /// paths to the root.
   std::optional<Eigen::MatrixXd> joint_covariance(std::span<const graph::VariableId> ids);
-  /// Covariance of each variable by itself, in the order given, poses as in joint_covariance();
-  /// empty (0 x 0) where a variable has no factor or one on its path to the root is not determined.
-  /// Costs one elimination of these paths, whatever the number of variables on them.
+  /// Covariance of each variable alone, in the order given, poses as in joint_covariance(); empty
+  /// (0 x 0) where a variable has no factor or one on its path to the root is not determined. Costs
+  /// one elimination of these paths, whatever the number of variables on them.
   std::vector<Eigen::MatrixXd> covariances(std::span<const graph::VariableId> ids);
 
   /// The factorised graph.
@@ -117,9 +118,9 @@ class IncrementalSmoother {
   std::size_t bytes() const { return graph_.bytes() + tree_.cliques().bytes(); }
 
  private:
-  /// What the next update starts from, besides graph, tree and Relinearisation.
+  /// Input of the next update, besides graph, tree and Relinearisation.
   struct Pending {
-    std::vector<int> fresh;       ///< Factors that the tree does not hold yet.
+    std::vector<int> fresh;       ///< Factors that are not in the tree yet.
     std::vector<int> doomed;      ///< Variables to be removed.
     int expected = graph::kNone;  ///< Variable of the next changes.
     bool solve_everything = false;
@@ -128,7 +129,7 @@ class IncrementalSmoother {
   /// Squared residuals of all factors.
   struct Loss {
     double chi2 = 0.0;
-    double rows = 1.0;  ///< Of the residuals.
+    double rows = 1.0;  ///< Number of rows of the residuals.
   };
 
   void begin_change();

@@ -21,13 +21,13 @@ class Marginals {
   /// Called with a variable and its covariance in its chart (see graph::Delta).
   using Visit = std::function<void(int, const Eigen::Ref<const Eigen::MatrixXd>&)>;
 
-  /// Works on these two, which must outlive it.
+  /// Both references must outlive it.
   Marginals(const graph::FactorGraph& graph, const CliqueTree& cliques)
       : graph_(graph), cliques_(cliques) {}
 
-  /// Visits each of the variables once that is in the tree, in no order. False, and some were not
-  /// visited, where the measurements leave a variable on the way undetermined. Costs about what one
-  /// elimination of the cliques between the variables and the root costs: of all variables one
+  /// Visits each of the variables that is in the tree once, in no defined order. False, and some
+  /// are not visited, where the measurements do not determine a variable on the way. Costs about
+  /// one elimination of the cliques between the variables and the root; for all variables one
   /// factorisation.
   bool visit(std::span<const int> variables, const Visit& found);
 
@@ -37,7 +37,7 @@ class Marginals {
   void report(const CliqueRecord& clique, const Visit& found) const;
   void hand_down(const CliqueRecord& clique);
 
-  /// A clique that waits for its turn, with the covariance of its separator.
+  /// A waiting clique and the covariance of its separator.
   struct Waiting {
     int clique = 0;
     Eigen::MatrixXd of_separator;
@@ -50,9 +50,10 @@ class Marginals {
   std::vector<int> needed_;      ///< Cliques marked in `is_needed_`.
   std::vector<int> offset_;      ///< Per variable: its first row in `covariance_`.
   std::vector<Waiting> waiting_;
-  Eigen::MatrixXd covariance_;  ///< Of the clique at work: frontal variables, then separator.
-  Eigen::MatrixXd inverse_;     ///< Of its L.
-  Eigen::MatrixXd gain_;        ///< d(frontal variables) / d(separator).
+  Eigen::MatrixXd
+      covariance_;  ///< Covariance of the present clique: frontal variables, then separator.
+  Eigen::MatrixXd inverse_;  ///< Inverse of its L.
+  Eigen::MatrixXd gain_;     ///< d(frontal variables) / d(separator).
 };
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -1,4 +1,4 @@
-// Which cliques the next elimination has to bring up to date.
+// Marks of the cliques that the next elimination must update.
 #pragma once
 
 #include <span>
@@ -8,13 +8,13 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Sets of cliques whose structure or whose numbers are out of date. With a clique, all above it
-/// are marked. commit() saves the sets, rollback() restores the saved ones.
+/// Sets of cliques with outdated structure or numbers. A mark on a clique includes all cliques
+/// above it. commit() saves the sets, rollback() restores the saved ones.
 class Marks {
  public:
-  /// The clique and all above it will be built anew. Costs the part of the path not yet marked so.
+  /// Marks the clique and all above it to be built again. Costs the unmarked part of the path.
   void mark_structure(const CliqueTree& tree, int clique);
-  /// The clique and all above it will be computed anew; their structure stays.
+  /// Marks the clique and all above it to be computed again; their structure stays.
   void mark_numbers(const CliqueTree& tree, int clique);
 
   /// True where the structure is marked.
@@ -23,17 +23,16 @@ class Marks {
   bool is_dirty(int clique) const { return mark(clique) == kDirty; }
   /// Cliques whose structure is marked, in the order of marking.
   std::span<const int> structural() const { return structural_; }
-  /// Cliques whose numbers were marked first, in the order of marking; some may be structural by
-  /// now.
+  /// Cliques whose numbers were marked, in the order of marking; some may be structural since then.
   std::span<const int> dirty() const { return dirty_; }
 
-  /// Follows the tree's capacity; new cliques are not marked.
+  /// Adapts to the tree's capacity; new cliques are not marked.
   void resize(int cliques) { mark_.resize(static_cast<std::size_t>(cliques), kClean); }
   /// Forgets all marks.
   void clear();
   /// Saves the sets as they are.
   void commit();
-  /// Restores the saved sets, for a tree that now has so many cliques.
+  /// Restores the saved sets, for a tree with `cliques` cliques.
   void rollback(int cliques);
 
  private:

@@ -8,17 +8,18 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Orders by exact minimum degree: of those of the earliest group that are left, the variable with
-/// the fewest degrees of freedom around it goes next, and ties all these together. Who is tied to
-/// whom is a bit for each pair: below some hundred variables that is a fraction of what CCOLAMD
-/// takes, which looks at every element, and the fill is no larger. Keeps its scratch memory.
+/// Orders by exact minimum degree: among the remaining variables of the earliest group, the
+/// variable with the fewest degrees of freedom in its neighbourhood is next, and its neighbours
+/// become connected. Connections are one bit per pair: below some hundred variables this takes a
+/// fraction of the time of CCOLAMD, which visits every element, and the fill is no larger. Keeps
+/// its scratch memory.
 class MinimumDegree {
  public:
-  /// Most variables: beyond, the bits cost more than they save.
+  /// Largest number of variables: beyond it the bits cost more than they save.
   static constexpr int kMost = 448;
 
   /// Writes the variable at each position. The groups must be known. Cost: the elements, and the
-  /// ties times the words of a row of bits.
+  /// connections times the words of a row of bits.
   void order(const EliminationProblem& problem, std::vector<int>& order);
 
  private:
@@ -29,11 +30,11 @@ class MinimumDegree {
   int next_of(int group, const EliminationProblem& problem) const;
   void eliminate(int variable, const EliminationProblem& problem);
 
-  std::size_t words_ = 0;            ///< Of a row.
-  std::vector<std::uint64_t> bits_;  ///< By variable: whom it is tied to.
-  std::vector<std::uint64_t> mask_;  ///< Of one element.
-  std::vector<int> degree_;          ///< Degrees of freedom it is tied to; kGone.
-  int left_ = 0;                     ///< Degrees of freedom of those that are left.
+  std::size_t words_ = 0;            ///< Words of a row.
+  std::vector<std::uint64_t> bits_;  ///< By variable: its neighbours.
+  std::vector<std::uint64_t> mask_;  ///< Variables of one element.
+  std::vector<int> degree_;          ///< Degrees of freedom of its neighbours; or kGone.
+  int left_ = 0;                     ///< Degrees of freedom of the remaining variables.
 };
 
 }  // namespace understory::factor_graph::bayes_tree

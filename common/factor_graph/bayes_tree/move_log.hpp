@@ -1,4 +1,4 @@
-// Which variables one solve moved, how far and where from.
+// Variables moved by one solve, with distance and earlier value.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Variables that the current solve moved, each once, with where they were before it.
+/// Variables that the present solve moved, each once, with their values before it.
 class MoveLog {
  public:
   /// Starts a solve on a graph of this variable capacity: nothing has moved yet.
@@ -22,8 +22,8 @@ class MoveLog {
     moved_in_.resize(static_cast<std::size_t>(variable_capacity), 0);
     distance_.resize(static_cast<std::size_t>(variable_capacity));
   }
-  /// The variable moves from `from` by `distance` [own conditional standard deviations]. Of several
-  /// moves the first `from` and the largest distance are kept.
+  /// Records a move from `from` by `distance` [own conditional standard deviations]. Of several
+  /// moves the first `from` and the largest distance are stored.
   void note(int variable, const graph::Delta& from, double distance) {
     const auto at = static_cast<std::size_t>(variable);
     if (moved_in_[at] != solve_) {
@@ -35,7 +35,7 @@ class MoveLog {
     distance_[at] = std::max(distance_[at], distance);
   }
 
-  /// Largest move among these variables [own conditional standard deviations]; 0: none moved.
+  /// Largest move among these variables [own conditional standard deviations]; 0 = none moved.
   double largest(std::span<const int> variables) const {
     double largest = 0.0;
     for (const int name : variables) {
@@ -46,7 +46,7 @@ class MoveLog {
   }
   /// The variables that moved, in the order of their first moves.
   const std::vector<int>& variables() const { return variables_; }
-  /// Where each of variables() was before the solve.
+  /// Value of each of variables() before the solve.
   const std::vector<graph::Delta>& from() const { return from_; }
 
  private:

@@ -1,4 +1,4 @@
-// Which factors are linearised again, and when.
+// Selects the factors to be linearised again.
 #pragma once
 
 #include <vector>
@@ -8,29 +8,29 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Part of a limit to deviations that holds for this factor: 1 for relative poses in the plane;
-/// residuals in space are larger by the root of their number of rows.
+/// Factor on a limit of deviations for this factor: 1 for relative poses in the plane; in space it
+/// allows for residuals that are larger by the root of their number of rows.
 double limit_scale(const graph::FactorRecord& factor);
 
-/// All factors that the tree holds, neighbours in it side by side. O(graph).
+/// All factors of the tree, ordered so that neighbours in the tree are adjacent. O(graph).
 std::vector<int> factors_of_tree(const CliqueTree& cliques);
 
-/// Factors that wait to be linearised again, and variables that wait for a new base of their
-/// charts. commit() saves the lists, rollback() restores the saved ones.
+/// Factors to be linearised again, and variables that need a new base of their charts. commit()
+/// saves the lists, rollback() restores the saved ones.
 class Relinearisation {
  public:
-  /// Works on these two, which must outlive it.
+  /// Both references must outlive it.
   Relinearisation(graph::FactorGraph& graph, BayesTree& tree) : graph_(graph), tree_(tree) {}
 
-  /// The factor is linearised with the next run().
+  /// The next run() linearises the factor.
   void add(int factor);
-  /// The variable's estimate becomes its chart's base with the next run(); its factors follow.
+  /// The next run() makes the variable's estimate its chart's base and linearises its factors.
   void rebase(int variable) { now_.rebase.push_back(variable); }
-  /// The factor leaves the graph.
+  /// Call it when the factor is removed from the graph.
   void forget_factor(int factor);
-  /// The variable leaves the graph.
+  /// Call it when the variable is removed from the graph.
   void forget_variable(int variable) { std::erase(now_.rebase, variable); }
-  /// Linearises what is due and marks it in the tree; returns the number of factors.
+  /// Linearises the listed factors and marks them in the tree; returns the number of factors.
   long run();
 
   /// Saves the lists as they are.

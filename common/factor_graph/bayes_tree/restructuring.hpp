@@ -1,4 +1,4 @@
-// New structure for the part of the tree that changed.
+// New structure for the changed part of the tree.
 #pragma once
 
 #include <span>
@@ -11,12 +11,12 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Replaces the cliques whose structure is marked by newly planned ones, and hangs the subtrees
-/// below them, which stay whole, into the new ones (iSAM2, Kaess et al. 2012). Keeps its scratch
-/// memory between calls; holds no state.
+/// Replaces the cliques whose structure is marked by newly planned ones, and links the unchanged
+/// subtrees below them to the new ones (iSAM2, Kaess et al. 2012). Keeps its scratch memory between
+/// calls; holds no state.
 class Restructuring {
  public:
-  /// Works on these two, which must outlive it.
+  /// Both references must outlive it.
   Restructuring(graph::FactorGraph& graph, CliqueTree& cliques)
       : graph_(graph), cliques_(cliques) {}
 
@@ -39,12 +39,12 @@ class Restructuring {
   graph::FactorGraph& graph_;
   CliqueTree& cliques_;
   CliquePlanner planner_;
-  std::vector<int> affected_;         ///< Variables whose elimination is planned anew.
-  std::vector<int> affected_at_;      ///< Per variable of the graph: its place in `affected_`.
-  std::vector<int> factors_;          ///< Of the clique that is built.
+  std::vector<int> affected_;         ///< Variables whose elimination is planned again.
+  std::vector<int> affected_at_;      ///< Per variable of the graph: its index in `affected_`.
+  std::vector<int> factors_;          ///< Factors of the clique being built.
   std::vector<int> element_factors_;  ///< The planner's first elements: factors ...
-  std::vector<int> orphans_;          ///< ... and behind them the subtrees that stay whole.
-  std::vector<int> dimensions_;       ///< Of `affected_`.
+  std::vector<int> orphans_;          ///< ... and after them the unchanged subtrees.
+  std::vector<int> dimensions_;       ///< Dimensions of `affected_`.
 };
 
 }  // namespace understory::factor_graph::bayes_tree

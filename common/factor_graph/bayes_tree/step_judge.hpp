@@ -1,4 +1,4 @@
-// How good a step is: factors against their linearisations.
+// Judges a step by comparing factors with their linearisations.
 #pragma once
 
 #include <cstdint>
@@ -9,31 +9,32 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// What a step is held to.
+/// Limits of a step.
 struct StepLimits {
   double relinearise_above = 0.0;  ///< Deviation from which a factor is linearised again [sigmas].
-  double loss = 0.0;               ///< Sum of squares that changes are compared with [sigmas^2].
+  double loss = 0.0;               ///< Reference sum of squares for changes [sigmas^2].
   bool is_thorough = false;        ///< Every linearisation was fresh before the step.
   bool is_repeated = false;        ///< Not the first step of its update.
 };
 
-/// What became of a step.
+/// The verdict on a step.
 struct StepVerdict {
-  bool is_accepted = true;       ///< False: the step is taken back.
-  bool is_shortened = false;     ///< Taken back or halved: the tree's solution was not reached.
-  double largest_deviation = 0;  ///< Of a factor from its linearisation [sigmas].
+  bool is_accepted = true;       ///< False: the step is undone.
+  bool is_shortened = false;     ///< Undone or halved: the tree's solution was not reached.
+  double largest_deviation = 0;  ///< Largest deviation of a factor from its linearisation [sigmas].
 };
 
 /// Compares the factors of the variables that the tree's last solve moved with their
-/// linearisations, and takes back or halves a step that makes the loss noticeably larger.
+/// linearisations, and undoes or halves a step that makes the loss noticeably larger.
 class StepJudge {
  public:
-  /// Works on these two, which must outlive it.
+  /// Both references must outlive it.
   StepJudge(graph::FactorGraph& graph, const BayesTree& tree) : graph_(graph), tree_(tree) {}
 
-  /// Judges the tree's last solve. Linearisations of different ages that do not fit together push
-  /// large graphs to and fro without end: where the step made the loss noticeably larger, those
-  /// noticeably old are to be made anew where it began; where there are none, it is halved.
+  /// Judges the tree's last solve. Inconsistent linearisations of different ages can make large
+  /// graphs oscillate without end: if the step made the loss noticeably larger, noticeably old
+  /// linearisations are listed to be made again at the start of the step; without such, the step is
+  /// halved.
   StepVerdict judge(const StepLimits& limits);
   /// Factors that the last judge() found too far from their linearisations.
   const std::vector<int>& stale() const { return stale_; }
@@ -42,8 +43,8 @@ class StepJudge {
   /// Sums over the judged factors.
   struct Losses {
     double loss = 0.0;
-    double linearised = 0.0;  ///< As the linearisations have it.
-    double left_out = 0.0;    ///< By them, at the end of the step.
+    double linearised = 0.0;  ///< Loss by the linearisations.
+    double left_out = 0.0;    ///< Part of the squared residuals that they lack, at the end.
   };
 
   void list_judged(double unless_below);
@@ -60,17 +61,17 @@ class StepJudge {
   graph::FactorGraph& graph_;
   const BayesTree& tree_;
   std::vector<int> judged_variables_;
-  std::vector<int> judged_;                 ///< Their factors.
-  std::vector<int> stale_;                  ///< Of those, what has to be linearised again.
-  std::vector<int> stale_before_;           ///< And what had to be before the step.
+  std::vector<int> judged_;                 ///< Judged factors.
+  std::vector<int> stale_;                  ///< Judged factors to be linearised again.
+  std::vector<int> stale_before_;           ///< Factors that had to be before the step.
   std::vector<std::uint64_t> judged_at_;    ///< Per factor: number of the comparison.
-  std::vector<double> factor_rotation_;     ///< And how far it had rotated then [rad].
+  std::vector<double> factor_rotation_;     ///< Rotation of each factor then [rad].
   std::vector<std::uint64_t> variable_at_;  ///< Per variable: number of the comparison.
-  std::vector<double> rotation_of_;         ///< And the largest of its factors' rotations [rad].
+  std::vector<double> rotation_of_;         ///< Largest rotation of its factors [rad].
   Losses at_end_;
   double largest_deviation_ = 0.0;     ///< [sigmas]
-  std::vector<graph::Delta> reached_;  ///< Of the changed variables.
-  std::uint64_t count_ = 0;            ///< Comparisons.
+  std::vector<graph::Delta> reached_;  ///< Values of the changed variables.
+  std::uint64_t count_ = 0;            ///< Number of comparisons.
 };
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -1,4 +1,4 @@
-// The lines of a g2o file: the one place that writes them.
+// Writes the lines of a g2o file.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@ class G2oWriter {
 
   /// A pose or a point of the plane (as many numbers as its type has). False for other types.
   bool vertex(graph::VariableType type, std::uint64_t number, std::span<const double> value);
-  /// Holds a vertex fast.
+  /// Fixes a vertex.
   void fix(std::uint64_t number);
   /// A measurement between two vertices of the plane: relative poses and Cartesian observations of
   /// points. False for other kinds.
