@@ -12,7 +12,7 @@ constexpr double kLeastChi2 = 1e-12;  ///< Below, a perfect fit.
 constexpr double kMaxDamping = 1e8;
 constexpr double kLeastRadius = 1e-10;
 
-/// The normal equations of a graph whose structure stays.
+/// The normal equations of a graph of constant structure.
 class Equations {
  public:
   explicit Equations(graph::FactorGraph& graph) : graph_(graph) {
@@ -73,7 +73,7 @@ class Equations {
     return y;
   }
 
-  /// Goes `step` from where it was linearised.
+  /// Moves by `step` from the point of linearisation.
   void move(const Eigen::VectorXd& step) {
     for (const int v : variables_)
       graph_.move(v, step.data() + columns_[static_cast<std::size_t>(v)]);
@@ -120,7 +120,7 @@ class Equations {
     std::sort(pattern.begin(), pattern.end());
     pattern.erase(std::unique(pattern.begin(), pattern.end()), pattern.end());
 
-    // The counts per column become the starts of the columns.
+    // Convert counts per column to starts of the columns.
     hessian_.column_starts.assign(static_cast<std::size_t>(hessian_.size) + 1, 0);
     for (const std::uint64_t entry : pattern) {
       ++hessian_.column_starts[(entry >> 32U) + 1];
@@ -130,7 +130,7 @@ class Equations {
       hessian_.column_starts[c + 1] += hessian_.column_starts[c];
     }
 
-    // Each entry remembers where its value goes.
+    // Each entry stores the place of its value.
     hessian_.values.resize(pattern.size());
     for (const std::uint64_t entry : entries) {
       slots_.push_back(static_cast<std::size_t>(
@@ -141,7 +141,7 @@ class Equations {
   graph::FactorGraph& graph_;
   std::vector<int> factors_;
   std::vector<int> variables_;
-  std::vector<int> columns_;  ///< First of each variable; kNone without factors.
+  std::vector<int> columns_;  ///< First column of each variable; kNone without factors.
   std::vector<int> targets_;
   std::vector<std::size_t> slots_;
   SymmetricSparse hessian_;

@@ -16,8 +16,8 @@ struct SparseCholesky::Impl {
   std::vector<int> rows;
 
   Impl() {
-    // CHOLMOD asks for four OpenMP threads whatever the computer has; results must not depend on
-    // them, and other processes need the cores.
+    // CHOLMOD requests four OpenMP threads on any computer; results must not depend on threads, and
+    // other processes need the cores.
     omp_set_max_active_levels(0);
     cholmod_start(&common);
     common.print = 0;
@@ -35,8 +35,8 @@ struct SparseCholesky::Impl {
 
 namespace {
 
-/// Debian's single-threaded OpenBLAS keeps its scratch memory without locks: two factorisations at
-/// a time give wrong numbers. Only experiments run several in one process.
+/// Debian's single-threaded OpenBLAS uses its scratch memory without locks: two parallel
+/// factorisations give wrong numbers. Only experiments run several in one process.
 std::mutex& blas_mutex() {
   static std::mutex mutex;
   return mutex;

@@ -63,7 +63,7 @@ void BackSubstitution::solve_clique(int id, double threshold) {
   move_variables(clique, threshold);
 }
 
-/// Children whose separator moved.
+/// Pushes the children with a moved separator.
 void BackSubstitution::push_children(int id, bool is_whole) {
   if (!is_whole && moves_.largest(rows_of(cliques_[id])) == 0.0) return;
 

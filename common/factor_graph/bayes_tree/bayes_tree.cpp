@@ -5,8 +5,8 @@
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// True of a column of the identity: a pivot without information; no measurement gives exactly
-/// that.
+/// True for a column of the identity: a pivot without information; no measurement has exactly this
+/// column.
 bool is_left_out(const CliqueRecord& clique, int column) {
   const double* l = clique.panel + static_cast<std::ptrdiff_t>(column) * clique.size;
   return l[column] == 1.0 &&

@@ -13,7 +13,7 @@ double CliqueDrafts::flops() const {
   return sum;
 }
 
-/// Hands every element to the first of its variables.
+/// Assigns every element to the first of its variables.
 void CliqueDrafts::sort_elements(const EliminationProblem& problem, std::span<const int> order) {
   const auto count = order.size();
   positions_.resize(count);
@@ -35,7 +35,7 @@ void CliqueDrafts::sort_elements(const EliminationProblem& problem, std::span<co
   }
 }
 
-/// What the variable at `position` is tied to among the later ones.
+/// Finds the later variables connected to the variable at `position`.
 void CliqueDrafts::draft(const EliminationProblem& problem, std::span<const int> order,
                          int position) {
   const auto at = static_cast<std::size_t>(position);
@@ -62,7 +62,7 @@ void CliqueDrafts::draft(const EliminationProblem& problem, std::span<const int>
   }
   for (int c = children_[at]; c != graph::kNone; c = drafts_[static_cast<std::size_t>(c)].next) {
     const Draft& child = drafts_[static_cast<std::size_t>(c)];
-    // By number: tie() makes the list longer.
+    // Indexed, because tie() extends the list.
     const auto first = static_cast<std::size_t>(child.first_separator);
     const auto count = static_cast<std::size_t>(child.separator_count);
     for (std::size_t i = first; i < first + count; ++i) tie(separators_[i]);
@@ -72,7 +72,7 @@ void CliqueDrafts::draft(const EliminationProblem& problem, std::span<const int>
   next_frontal_[at] = graph::kNone;
 }
 
-/// A child joins its parent where both fronts in one cost less time than apart.
+/// Merges a child into its parent if one front costs less time than two.
 void CliqueDrafts::merge_children(int position, int first_child) {
   Draft& parent = drafts_[static_cast<std::size_t>(position)];
   for (int c = first_child; c != graph::kNone;) {
@@ -106,7 +106,7 @@ void CliqueDrafts::draft_all(const EliminationProblem& problem, std::span<const 
     merge_children(p, children_[static_cast<std::size_t>(p)]);
     if (done.separator_count == 0) continue;
 
-    // The first variable of the separator is eliminated by the parent.
+    // The parent eliminates the first variable of the separator.
     const auto begin = separators_.begin() + done.first_separator;
     const int parent = *std::min_element(begin, begin + done.separator_count);
     done.next = children_[static_cast<std::size_t>(parent)];
@@ -120,7 +120,7 @@ void CliqueDrafts::append(const Draft& draft, std::span<const int> order) {
   clique.frontal_count = draft.frontal_count;
   clique.row_count = draft.frontal_count + draft.separator_count;
 
-  // The merged variables' elements in one list.
+  // Collect the merged variables' elements in one list.
   clique.first_element = graph::kNone;
   int* tail = &clique.first_element;
   for (int p = draft.first_frontal; p != graph::kNone;

@@ -11,9 +11,9 @@
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// From this much work on a dissection may pay, which takes a millisecond for 200 variables
-/// [flops]; and if the work is this many times what the largest element alone costs in any order.
-/// Few variables are divided once or twice, which gains little: there it must be 2 ms of fronts.
+/// Least work [flops] for which a dissection may pay (it takes a millisecond for 200 variables),
+/// and least ratio of the work to the lower bound from the largest element. Few variables are
+/// divided only once or twice, which gains little: for these the fronts must take 2 ms.
 constexpr double kMuchWork = 5e6;
 constexpr double kMuchWorkOfFew = 2e7;
 constexpr int kFew = 400;
@@ -21,7 +21,7 @@ constexpr double kRoomForLess = 2.0;
 
 }  // namespace
 
-/// Few variables: as they came, those of the later groups behind.
+/// Few variables: in the given order, later groups last.
 void CliquePlanner::order_few() {
   order_.resize(static_cast<std::size_t>(problem_.size()));
   std::iota(order_.begin(), order_.end(), 0);
@@ -34,13 +34,13 @@ void CliquePlanner::order() {
   if (problem_.size() <= 3) return order_few();
   if (problem_.size() <= MinimumDegree::kMost) return minimum_degree_.order(problem_, order_);
 
-  // Where each variable's list of elements begins.
+  // Start of each variable's list of elements.
   const std::span<const int> entries = problem_.entries();
   column_starts_.assign(static_cast<std::size_t>(problem_.size()) + 1, 0);
   for (const int v : entries) ++column_starts_[static_cast<std::size_t>(v) + 1];
   std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
 
-  // The lists; order_ is where to write next.
+  // Write the lists; order_ has the next index of each.
   const std::size_t space = ccolamd_recommended(static_cast<int>(entries.size()),
                                                 problem_.element_count(), problem_.size());
   if (row_indices_.size() < space) row_indices_.resize(space + space / 2);
@@ -63,7 +63,7 @@ void CliquePlanner::order() {
   order_.assign(column_starts_.begin(), column_starts_.end() - 1);
 }
 
-/// False where there is none.
+/// False where there is no such order.
 bool CliquePlanner::order_by_dissection() {
   std::vector<int> number_of(static_cast<std::size_t>(problem_.size()), graph::kNone);
   std::vector<int> divided;
@@ -76,7 +76,7 @@ bool CliquePlanner::order_by_dissection() {
   const std::vector<int> order =
       dissect(problem_.elements(), number_of, static_cast<int>(divided.size()));
   if (order.empty()) return false;
-  // Those of the last group are behind already.
+  // Variables of the last group are already at the end.
   for (std::size_t p = 0; p < order.size(); ++p) {
     order_[p] = divided[static_cast<std::size_t>(order[p])];
   }

@@ -63,7 +63,7 @@ void CliqueTree::remove_factor(int factor) {
   places_.put(factor, {});
 }
 
-/// What was taken out since the last commit and was there then. The cliques are those of then.
+/// Puts back the factors removed since the last commit. The cliques are already restored.
 void CliqueTree::put_factors_back() {
   places_.rollback();
   for (const TakenOut& one : taken_out_) {
@@ -90,7 +90,7 @@ void CliqueTree::remove(std::span<const int> ids) {
   total_flops_ -= flops;
 }
 
-/// False: the numbers of the last commit are to be given up. Asked once for each clique.
+/// False: the numbers of the last commit must be dropped. Called once for each clique.
 bool CliqueTree::keeps_for_undo(const CliqueRecord& clique) {
   if (keeps_all_) return true;
   const std::size_t bytes = clique.panel_numbers() * sizeof(double);
@@ -114,7 +114,7 @@ double* CliqueTree::writable_panel(int id) {
   return clique.panel;
 }
 
-/// Of a clique that leaves the tree: numbers of before the last commit stay where they fit.
+/// Drops the panel of a removed clique; numbers from before the last commit stay if they fit.
 void CliqueTree::drop_panel(CliqueRecord& clique) {
   if (clique.panel == nullptr) return;
   if (clique.panel_epoch != cliques_.epoch()) {

@@ -23,7 +23,7 @@ void Covariance::collect_paths(std::span<const int> variables) {
   for (const int c : found_) is_on_path_[static_cast<std::size_t>(c)] = 0;
 }
 
-/// Children first.
+/// Sorts children before parents.
 void Covariance::sort_paths() {
   pending_.resize(static_cast<std::size_t>(cliques_.capacity()), 0);
   path_.clear();
@@ -58,7 +58,7 @@ std::optional<int> Covariance::give_rows() {
   return rows;
 }
 
-/// E: the identity's columns of the variables.
+/// Sets E: the columns of the identity for the variables.
 void Covariance::set_right_side(std::span<const int> variables, Eigen::Index rows,
                                 Eigen::Index columns) {
   right_.setZero(rows, columns);
@@ -106,7 +106,7 @@ std::optional<Eigen::MatrixXd> Covariance::joint(std::span<const int> variables)
   set_right_side(variables, *rows, columns);
   for (const int c : path_) forward(cliques_[c]);
 
-  // E' (L L')^-1 E = W' W with W = L^-1 E: half the work, and symmetric as it comes.
+  // E' (L L')^-1 E = W' W with W = L^-1 E: half the work, and exactly symmetric.
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(columns, columns);
   result.selfadjointView<Eigen::Lower>().rankUpdate(right_.transpose());
   return Eigen::MatrixXd(result.selfadjointView<Eigen::Lower>());

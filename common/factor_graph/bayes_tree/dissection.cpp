@@ -8,8 +8,8 @@
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// METIS draws from the C library's rand(), which it seeds with each call: two at a time would
-/// depend on each other.
+/// METIS uses the C library's rand() and seeds it in each call: two parallel calls would influence
+/// each other.
 std::mutex& random_mutex() {
   static std::mutex mutex;
   return mutex;

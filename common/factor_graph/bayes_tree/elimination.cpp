@@ -7,11 +7,11 @@
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// A pivot below this part of the information that went into it is rounding noise.
+/// A pivot below this fraction of its summed information is rounding noise.
 constexpr double kLeastPivot = 1e-13;
-/// A contribution is kept where computing it again takes more time than this per number [us], and
-/// where it is small: on a sphere of 2500 poses the others are a sixth of all memory and cost 1.5 %
-/// of the fronts' time.
+/// A contribution is stored if its computation takes more time than this per number [us], or if it
+/// is small: on a sphere of 2500 poses the others are a sixth of all memory and cost 1.5 % of the
+/// fronts' time.
 constexpr double kWorthKeeping = 0.006;
 constexpr int kFewRows = 48;
 
@@ -26,13 +26,13 @@ void Elimination::list_dirty(const Marks& marks, std::vector<int>& computed) {
   computed.clear();
   pending_.resize(static_cast<std::size_t>(cliques_.capacity()), 0);
 
-  // How many children each one has to wait for.
+  // Count the children that each one waits for.
   for (const int c : marks.dirty()) {
     const int parent = cliques_[c].parent;
     if (marks.is_dirty(c) && marks.is_dirty(parent)) ++pending_[static_cast<std::size_t>(parent)];
   }
 
-  // Those without such children, then each as soon as its last child is listed.
+  // List cliques without such children, then each clique after its last child.
   for (const int c : marks.dirty()) {
     if (marks.is_dirty(c) && pending_[static_cast<std::size_t>(c)] == 0) computed.push_back(c);
   }
@@ -44,13 +44,13 @@ void Elimination::list_dirty(const Marks& marks, std::vector<int>& computed) {
   }
 }
 
-/// Children first, one subtree after the other: what is dropped once the parent is computed is
-/// there for a short time.
+/// Children first, one subtree after the other, so that contributions which are dropped after the
+/// parent's computation exist only for a short time.
 void Elimination::order_by_subtrees(std::span<const int> cliques) {
   is_listed_.resize(static_cast<std::size_t>(cliques_.capacity()), 0);
   for (const int c : cliques) is_listed_[static_cast<std::size_t>(c)] = 1;
 
-  // Parents first, backwards.
+  // Parents first; reversed below.
   order_.clear();
   for (const int top : cliques) {
     if (is_listed_[static_cast<std::size_t>(cliques_[top].parent)] != 0) continue;
@@ -99,7 +99,7 @@ double dot(const double* a, const double* b) {
   return sum;
 }
 
-/// [J | b]' [J | b] into the front.
+/// Adds [J | b]' [J | b] to the front.
 template <int rows>
 void add_products(const double* j, int columns, const int* targets, double* front, int size) {
   for (int a = 0; a < columns; ++a) {
@@ -125,7 +125,7 @@ void add_products_any(const double* j, int rows, int columns, const int* targets
   }
 }
 
-/// The same of an observation in the plane, 2 x (3 + 2 + 1): most factors of a map.
+/// The same for an observation in the plane, 2 x (3 + 2 + 1): most factors of a map.
 void add_observation(const double* j, std::ptrdiff_t pose, std::ptrdiff_t point, double* front,
                      std::ptrdiff_t size) {
   const auto product = [&](int a, int b) { return dot<2>(j + 2 * a, j + 2 * b); };
@@ -153,7 +153,7 @@ void add_observation(const double* j, std::ptrdiff_t pose, std::ptrdiff_t point,
 }  // namespace
 
 void Elimination::add_factors(const CliqueRecord& clique) {
-  // Those that were taken out are none of a clique that is computed.
+  // A clique being computed has no removed factors.
   const std::span<const int> factors = clique.assembled();
   for (std::size_t i = 0; i < factors.size(); ++i) {
     if (i + 2 * graph::kFetchAhead < factors.size())
@@ -193,7 +193,7 @@ void Elimination::add_factors(const CliqueRecord& clique) {
   }
 }
 
-/// Rows of the child's Schur complement in the parent's front, in runs that stay side by side.
+/// Rows of the child's Schur complement in the parent's front, in contiguous runs.
 void Elimination::find_runs(const CliqueRecord& child, int size) {
   runs_.clear();
   int row = 0;
@@ -230,8 +230,8 @@ void Elimination::assemble(const CliqueRecord& clique) {
   }
 }
 
-/// The front, factorised; returns how many pivots were left out. The children's contributions must
-/// be there; those that are not kept have done their service.
+/// Factorises the front; returns the number of pivots left out. The children's contributions must
+/// exist; those not kept are dropped afterwards.
 int Elimination::compute(const CliqueRecord& clique) {
   assemble(clique);
   for (int c = clique.first_child; c != graph::kNone; c = cliques_[c].next_sibling) {
@@ -247,7 +247,7 @@ void Elimination::list_missing_children(int id) {
   }
 }
 
-/// Computes the contributions of the clique's children again that are not there.
+/// Computes the missing contributions of the clique's children again.
 void Elimination::rebuild_children(int id) {
   missing_.clear();
   list_missing_children(id);
@@ -267,7 +267,7 @@ void Elimination::store_contribution(int id) {
   }
 }
 
-/// What computing the contribution again will take, and whether it is worth its memory.
+/// Computes the time to rebuild the contribution, and decides whether it is stored.
 void Elimination::judge_contribution(int id) {
   CliqueRecord& clique = cliques_.edit(id);
   double us = front_time_us(clique.pivots, clique.size - clique.pivots - 1);

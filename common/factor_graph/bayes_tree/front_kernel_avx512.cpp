@@ -7,7 +7,7 @@ namespace understory::factor_graph::bayes_tree {
 #if defined(__AVX512F__) && defined(__FMA__)
 namespace {
 
-/// Shorter columns end before the wide registers pay.
+/// Wide registers do not pay for shorter columns.
 constexpr int kManyRows = 64;
 
 int factorise(double* front, int size, int pivots, const double* least, int* left_out) {

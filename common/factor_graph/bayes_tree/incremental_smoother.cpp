@@ -7,29 +7,29 @@
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// A pose3's chart is left before its rotation gets far from the base [rad].
+/// A pose3's chart gets a new base when its rotation exceeds this [rad].
 constexpr double kFarRotation = 0.6;
-/// An update that has done more than this part of one factorisation's work leaves further
-/// iterations to the next one.
+/// An update that has done more than this fraction of one factorisation's work leaves further
+/// iterations to the next update.
 constexpr double kMostWork = 0.3;
-constexpr double kAnyWork = 1e9;     ///< Where the whole is asked for.
-constexpr double kLittleWork = 2e5;  ///< Is no reason to [flops].
-/// A whole step on fresh linearisations that changes the loss by less than this part of it is the
-/// last one.
+constexpr double kAnyWork = 1e9;     ///< For an update of the whole graph.
+constexpr double kLittleWork = 2e5;  ///< Less work than this never stops an update [flops].
+/// A complete step on new linearisations is the last one if it changes the loss by less than this
+/// fraction.
 constexpr double kSettledGain = 1e-5;
 /// Losses below this many squared sigmas per row are rounding.
 constexpr double kLossRounding = 1e-12;
-/// A single update notices changes of the loss from a part of this on [sigma^2].
+/// A single update compares changes of the loss with this value [sigma^2].
 constexpr double kUsualLoss = 1.0;
 
-/// The diagonal block at `first` in another frame: rows and columns are rotated by `by`.
+/// Transforms the diagonal block at `first` to another frame: rotates rows and columns by `by`.
 void rotate(Eigen::MatrixXd& covariance, Eigen::Index first, const Eigen::MatrixXd& by) {
   covariance.middleRows(first, by.rows()) = by * covariance.middleRows(first, by.rows());
   covariance.middleCols(first, by.rows()) =
       covariance.middleCols(first, by.rows()) * by.transpose();
 }
 
-/// From the chart, which is the world's, to the pose's own frame.
+/// Transforms from the chart (axes of the world) to the pose's own frame.
 void to_own_frame(const graph::VariableRecord& variable, Eigen::MatrixXd& covariance,
                   Eigen::Index at) {
   if (variable.type == graph::VariableType::kPose2) {
@@ -74,7 +74,7 @@ void IncrementalSmoother::checkpoint() {
 }
 
 void IncrementalSmoother::rollback() {
-  graph_.rollback();  // first: the tree computes numbers of then from it
+  graph_.rollback();  // first: the tree computes its restored numbers from the graph
   tree_.rollback();
   relinearisation_.rollback();
   pending_ = saved_pending_;
@@ -100,7 +100,7 @@ void IncrementalSmoother::remove(graph::FactorId id) {
   if (tree_.cliques().clique_of(index(id)) == graph::kNone) {
     std::erase(pending_.fresh, index(id));
   } else {
-    // What it tied together may fall apart: all that it touches is ordered anew.
+    // Its variables may no longer be connected: order all of them again.
     for (const int v : graph_.variables_of(index(id))) tree_.mark_structure(v);
     tree_.detach(index(id));
   }
@@ -142,7 +142,7 @@ void IncrementalSmoother::collect_moved() {
   }
 }
 
-/// What the next update will most likely change.
+/// Finds the variables that the next update will probably change.
 void IncrementalSmoother::find_last() {
   last_.clear();
   const auto add = [&](int f) {
@@ -165,15 +165,15 @@ void IncrementalSmoother::eliminate(IncrementalUpdate& update) {
   pending_.fresh.clear();
 }
 
-/// One step; false where it was taken back. `whole_loss`: of a step of the whole graph, the loss
-/// that changes are compared with.
+/// One step; false where it was undone. `whole_loss`: for a step of the whole graph, the reference
+/// loss for changes.
 bool IncrementalSmoother::iterate(IncrementalUpdate& update, std::optional<double> whole_loss) {
   ++update.iterations;
   update.relinearised_factors += relinearisation_.run();
   eliminate(update);
 
   if (whole_loss || pending_.solve_everything) {
-    // Many small moves that are left out add up to a part of the loss.
+    // Many omitted small moves would add up to a part of the loss.
     tree_.solve_everything(whole_loss ? 0.0 : parameters_.least_move);
     pending_.solve_everything = false;
   } else {
@@ -214,8 +214,8 @@ IncrementalUpdate IncrementalSmoother::update() {
   return run(std::nullopt);
 }
 
-/// What each factor is off its linearisation says nothing about the sum over a long chain: only a
-/// step on fresh linearisations does.
+/// The deviation of single factors is no measure of the sum over a long chain: only a step on new
+/// linearisations is.
 IncrementalUpdate IncrementalSmoother::whole_step(const Loss& before) {
   begin_change();
   for (const int f : factors_of_tree(tree_.cliques())) relinearisation_.add(f);

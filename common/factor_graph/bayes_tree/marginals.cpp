@@ -2,7 +2,7 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// The variables, and the cliques on their paths to the root.
+/// Marks the variables, and the cliques on their paths to the root.
 void Marginals::mark(std::span<const int> variables) {
   is_needed_.resize(static_cast<std::size_t>(cliques_.capacity()), 0);
   is_wanted_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
@@ -51,7 +51,7 @@ void Marginals::report(const CliqueRecord& clique, const Visit& found) const {
   }
 }
 
-/// Each needed child gets the covariance of its separator.
+/// Gives each needed child the covariance of its separator.
 void Marginals::hand_down(const CliqueRecord& clique) {
   for (int c = clique.first_child; c != graph::kNone; c = cliques_[c].next_sibling) {
     if (is_needed_[static_cast<std::size_t>(c)] == 0) continue;

@@ -37,7 +37,7 @@ void Marks::rollback(int cliques) {
   mark_.resize(static_cast<std::size_t>(cliques));
   structural_.assign(saved_.structural.begin(), saved_.structural.end());
   dirty_.assign(saved_.dirty.begin(), saved_.dirty.end());
-  // In the order of marking: what was dirty first may have become structural.
+  // In the order of marking: a dirty clique may have become structural.
   for (const int c : dirty_) mark_[static_cast<std::size_t>(c)] = kDirty;
   for (const int c : structural_) mark_[static_cast<std::size_t>(c)] = kStructural;
 }

@@ -17,7 +17,7 @@ std::uint64_t bit_of(int variable) {
   return std::uint64_t{1} << (static_cast<unsigned>(variable) % kWordBits);
 }
 
-/// f(variable) for every bit.
+/// Calls f(variable) for every bit.
 template <typename F>
 void for_each_bit(const std::uint64_t* bits, std::size_t words, F&& f) {
   for (std::size_t w = 0; w < words; ++w) {
@@ -54,7 +54,7 @@ void MinimumDegree::tie(const EliminationProblem& problem) {
   }
 }
 
-/// The one with the least degree; kNone where the group is through.
+/// The variable with the least degree; kNone at the end of the group.
 int MinimumDegree::next_of(int group, const EliminationProblem& problem) const {
   int next = graph::kNone;
   int least = kGone;
@@ -101,7 +101,7 @@ void MinimumDegree::order(const EliminationProblem& problem, std::vector<int>& o
         continue;
       }
 
-      // All that are left are tied to each other: any order is the same.
+      // All remaining variables are connected to each other: any order is equal.
       degree_[static_cast<std::size_t>(v)] = kGone;
       for (int other = 0; other < problem.size(); ++other)
         if (degree_[static_cast<std::size_t>(other)] != kGone) order.push_back(other);

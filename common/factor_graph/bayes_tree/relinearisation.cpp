@@ -6,7 +6,7 @@
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// Residuals of more rows than these are as large as those of so many.
+/// Residuals with more rows count as if they had this many.
 constexpr int kMostRows = 6;
 constexpr double kPlanarRows = 3.0;
 

@@ -8,7 +8,7 @@ void Restructuring::collect_variable(int variable) {
   affected_.push_back(variable);
 }
 
-/// What a clique that leaves the tree leaves behind: its variables, factors and whole subtrees.
+/// Collects the variables, factors and unchanged subtrees of a clique that is removed.
 void Restructuring::take_apart(int clique, const Marks& marks) {
   const CliqueRecord record = cliques_[clique];
 
@@ -86,7 +86,8 @@ int Restructuring::build_clique(const CliquePlan& plan, int planned) {
   return id;
 }
 
-/// Factors and whole subtrees that the new clique is the first to eliminate a variable of.
+/// Assigns factors and unchanged subtrees to the new clique if it is the first to eliminate one of
+/// their variables.
 void Restructuring::hand_out_elements(const CliquePlan& plan, int planned, int id) {
   factors_.clear();
   const auto factor_count = element_factors_.size();

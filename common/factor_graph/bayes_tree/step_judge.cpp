@@ -8,15 +8,16 @@
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// Part of the limit to deviations that may grow unseen.
+/// Fraction of the limit on deviations by which a deviation may grow unchecked.
 constexpr double kNegligible = 0.2;
-/// What the linearisations leave out is looked at from this part of the loss on; a step must keep
-/// the other part of what they promised.
+/// Errors of the linearisations are checked from this fraction of the loss on; kLeastGain: fraction
+/// of the promised gain that a step must reach.
 constexpr double kNoticedPart = 0.1;
-constexpr double kNoticedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
+/// The same for thorough updates, which start with new linearisations.
+constexpr double kNoticedRounding = 1e-3;
 constexpr double kLeastGain = 0.1;
 constexpr int kMaxHalvings = 8;
-/// So many entries of a table are read in the time that one entry of a list is waited for.
+/// Number of table entries read in the time of one access to a list entry.
 constexpr int kTableEntriesPerWait = 8;
 
 }  // namespace
@@ -31,7 +32,7 @@ void StepJudge::compare_factor(int factor, double limit) {
   if (deviation.residual > limit * limit_scale(graph_.factor(factor))) stale_.push_back(factor);
 }
 
-/// The factors of the variables that moved, where the moves are such that it can matter.
+/// Lists the factors of the moved variables if the moves are large enough to matter.
 void StepJudge::list_judged(double unless_below) {
   ++count_;
   judged_.clear();
@@ -41,7 +42,7 @@ void StepJudge::list_judged(double unless_below) {
   variable_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
   rotation_of_.resize(variable_at_.size());
 
-  int factors = 0;  // With repetitions.
+  int factors = 0;  // Counted with repetitions.
   for (const int v : tree_.changed()) {
     if (graph_.unjudged_deviation(v) < unless_below) continue;
     judged_variables_.push_back(v);
@@ -49,7 +50,8 @@ void StepJudge::list_judged(double unless_below) {
     factors += graph_.variable(v).degree;
   }
 
-  // Of many the table is gone through as it lies in memory: a list is waited for at every entry.
+  // For many factors the whole table is read in memory order: following lists waits for memory at
+  // every entry.
   if (factors > graph_.factor_capacity() / kTableEntriesPerWait) {
     graph_.list_factors([&](int v) { return is_judged(v); }, judged_);
     return;
@@ -82,7 +84,7 @@ double StepJudge::compare(double unless_below, double limit) {
   return largest_deviation_;
 }
 
-/// The variables' factors were compared where these are now.
+/// Stores the present values as those of the last comparison.
 void StepJudge::keep_comparison() {
   for (const int v : judged_variables_) rotation_of_[static_cast<std::size_t>(v)] = 0.0;
   for (const int f : judged_) {
@@ -99,8 +101,8 @@ void StepJudge::keep_comparison() {
   }
 }
 
-/// Goes back to where the step began. Returns what the step did to the judged factors' losses;
-/// those that are noticeably old even there are `stale_before_`.
+/// Returns to the start of the step. Returns the changes of the judged factors' losses by the step;
+/// factors noticeably old even at the start go to `stale_before_`.
 StepJudge::Losses StepJudge::go_back(double limit) {
   reached_.clear();
   for (const int v : tree_.changed()) reached_.push_back(graph_.variable(v).delta);
@@ -138,7 +140,7 @@ StepVerdict StepJudge::judge(const StepLimits& limits) {
   verdict.largest_deviation = compare(kNegligible * limit, limit);
 
   for (int i = 0; i < kMaxHalvings && at_end_.left_out > noticed; ++i) {
-    // Did the loss grow, or a repeated step gain too little of what it promised?
+    // Did the loss grow, or did a repeated step gain too little of its prediction?
     const Losses change = go_back(kNegligible * limit);
     const bool promised_more = limits.is_repeated && change.loss - change.linearised > noticed &&
                                change.loss > kLeastGain * change.linearised;
@@ -147,7 +149,7 @@ StepVerdict StepJudge::judge(const StepLimits& limits) {
       return verdict;
     }
 
-    // Old linearisations are to blame first.
+    // First remedy: renew old linearisations.
     verdict.is_shortened = true;
     if (i == 0 && !stale_before_.empty()) {
       stale_ = stale_before_;
@@ -156,7 +158,7 @@ StepVerdict StepJudge::judge(const StepLimits& limits) {
       return verdict;
     }
 
-    // Then the length of the step.
+    // Second remedy: halve the step.
     go_half_the_distance();
     verdict.largest_deviation = compare(0.0, limit);
   }

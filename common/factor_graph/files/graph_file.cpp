@@ -15,7 +15,8 @@
 namespace understory::factor_graph::files {
 namespace {
 
-/// Of the greatest entry: what rounding leaves of a zero eigenvalue. The factor graph's own limit.
+/// Fraction of the greatest entry that rounding may leave of a zero eigenvalue; the factor graph
+/// has the same limit.
 constexpr double kRounding = 1e-9;
 constexpr std::size_t kMostTags = 20;
 constexpr std::size_t kTagBytes = 40;
@@ -29,7 +30,7 @@ Eigen::Matrix<double, size, size> upper_triangle(GraphLine& line) {
   return m;
 }
 
-/// A rotation of zero length is left as it is: for the caller to refuse.
+/// A quaternion of zero length is returned unchanged; the caller refuses it.
 graph::Pose3 pose3(GraphLine& line) {
   graph::Pose3 pose;
   for (int i = 0; i < 3; ++i) pose.translation[i] = line.number();
@@ -64,7 +65,7 @@ std::span<const std::string_view> tags_of(GraphFormat format) {
   return kIsamTags;
 }
 
-/// A part of a tag can only be a damaged one, and its line would be lost.
+/// A prefix of a tag is a damaged tag, and its line would be lost.
 bool is_cut_tag(std::string_view word, GraphFormat format) {
   const auto tags = tags_of(format);
   return std::any_of(tags.begin(), tags.end(), [&](std::string_view tag) {
@@ -72,7 +73,8 @@ bool is_cut_tag(std::string_view word, GraphFormat format) {
   });
 }
 
-/// Information of the quaternion's vector part as one of the rotation vector, which is twice it.
+/// Information of the quaternion's vector part converted to the rotation vector, which is twice the
+/// vector part.
 Eigen::Matrix<double, 6, 6> of_rotation_vector(Eigen::Matrix<double, 6, 6> information) {
   information.bottomRows<3>() *= 0.5;
   information.rightCols<3>() *= 0.5;
@@ -105,7 +107,7 @@ class Reader {
     return fault_of_edge();
   }
 
-  /// What only the whole file shows; the line is 0 where it is none in particular.
+  /// Faults that need the whole file; line 0 = no particular line.
   std::optional<GraphFileError> fault_of_whole() const {
     if (vertices_.empty()) return GraphFileError{0, "no graph: neither a vertex nor an edge in it"};
     const bool has_values = std::any_of(vertices_.begin(), vertices_.end(),
@@ -158,7 +160,7 @@ class Reader {
     return std::nullopt;
   }
 
-  /// Of the last edge.
+  /// Fault of the last edge.
   std::optional<std::string> fault_of_edge() const {
     const graph::Factor& edge = result_.factors.back();
     if (is_semi_definite(edge.information)) return std::nullopt;
@@ -169,7 +171,7 @@ class Reader {
            ": the information is not positive semi-definite";
   }
 
-  /// Of the last edge.
+  /// Whether the last edge connects a vertex to itself.
   bool ties_to_itself() const {
     if (result_.factors.empty() || result_.factors.back().variable_count < 2) return false;
     const auto key_of = [&](int i) {
@@ -206,7 +208,7 @@ class Reader {
     return true;
   }
 
-  /// A sensor's place on the pose: only where it is the pose's own can it be left out.
+  /// Reads a sensor's offset on the pose; only the identity is accepted.
   bool read_offset(std::string_view word, GraphLine& line) {
     if (format_ != GraphFormat::kG2o) return false;
     if (word != "PARAMS_SE3OFFSET" && word != "PARAMS_SE2OFFSET") return false;
@@ -275,7 +277,7 @@ class Reader {
     } else if (word == "EDGE_SE3_TRACKXYZ") {
       const graph::VariableId a = name(line.integer(), kPose3);
       const graph::VariableId b = name(line.integer(), kPoint3);
-      line.integer();  // The sensor's offset: this format's PARAMS lines, identity in our files.
+      line.integer();  // Number of the sensor's offset (PARAMS lines), which must be the identity.
       Eigen::Vector3d p;
       for (int i = 0; i < 3; ++i) p[i] = line.number();
       result_.factors.push_back(observation(a, b, p, upper_triangle<3>(line)));
@@ -310,12 +312,12 @@ class Reader {
     vertex->second = {number, type, value, true};
   }
 
-  /// Poses and landmarks of iSAM's files count for themselves.
+  /// Poses and landmarks of iSAM's files have separate numbers.
   Key key(std::int64_t number, graph::VariableType type) const {
     return {format_ == GraphFormat::kIsam && type == graph::VariableType::kPoint2, number};
   }
 
-  /// Until all are known a variable goes by its place in `keys_`.
+  /// Until all variables are known, a variable is named by its index in `keys_`.
   graph::VariableId name(std::int64_t number, graph::VariableType type) {
     const auto [vertex, is_new] = vertices_.try_emplace(key(number, type));
     if (is_new) vertex->second = {number, type, graph::value_of(geometry::SE2()), false};
@@ -330,7 +332,7 @@ class Reader {
   GraphFormat format_;
   std::map<Key, GraphFile::Vertex> vertices_;
   std::vector<Key> keys_;
-  std::vector<int> key_lines_;  // of the edges that name them
+  std::vector<int> key_lines_;  // lines of the edges that name them
   std::vector<std::pair<std::int64_t, int>> fixed_lines_;
   int line_ = 0;
   GraphFile result_;

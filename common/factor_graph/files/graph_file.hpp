@@ -1,4 +1,4 @@
-// Graphs as text: g2o, TORO, iSAM.
+// Graphs as text files: g2o, TORO, iSAM.
 #pragma once
 
 #include <cstdint>
@@ -16,34 +16,34 @@ class FactorGraph;
 
 namespace understory::factor_graph::files {
 
-/// A graph with the numbers that its file gives. Variables of factors are positions in `vertices`.
+/// A graph with the numbers of its file. Variables of factors are positions in `vertices`.
 struct GraphFile {
-  /// A variable with the number that its file gives.
+  /// A variable with its number in the file.
   struct Vertex {
     std::int64_t number = 0;
     graph::VariableType type = graph::VariableType::kPose2;
     graph::Value value{};
-    bool has_value = false;  ///< Formats of measurements alone give none.
+    bool has_value = false;  ///< False for formats that have only measurements.
   };
-  std::vector<Vertex> vertices;        ///< In order of their numbers; iSAM's landmarks last.
+  std::vector<Vertex> vertices;        ///< Ordered by number; iSAM's landmarks last.
   std::vector<graph::Factor> factors;  ///< In order of the file.
-  std::vector<std::int64_t> fixed;     ///< Numbers of vertices that the file holds fast.
-  /// Lines of edges from a vertex to itself: left out, for they hold no information about it.
+  std::vector<std::int64_t> fixed;     ///< Numbers of vertices fixed by the file.
+  /// Lines of edges from a vertex to itself: left out, because they have no information on it.
   std::vector<int> self_edges;
   std::vector<int> factor_lines;  ///< Line of each factor, from 1; empty where there is no file.
-  /// Lines that were passed over, by their tag.
+  /// Skipped lines, by their tag.
   struct Skipped {
-    std::string tag;  ///< As it stands in the file, 40 bytes at most: for messages.
+    std::string tag;  ///< As in the file, at most 40 bytes: for messages.
     int first_line = 0;
     int lines = 0;
   };
-  std::vector<Skipped> skipped;  ///< The first 20 tags; the last one stands for all others.
+  std::vector<Skipped> skipped;  ///< The first 20 tags; the last one counts all others.
 };
 
-/// What is wrong with a file, and in which line.
+/// The fault of a file, and its line.
 struct GraphFileError {
   int line = 0;      ///< From 1; 0 = none.
-  std::string what;  ///< For messages.
+  std::string what;  ///< Text for messages.
 };
 
 /// Text formats of pose graphs.
@@ -56,17 +56,17 @@ enum class GraphFormat : std::uint8_t {
 
 /// Format by the tags that the text contains.
 GraphFormat guess_format(std::string_view text);
-/// Reads a graph; lines with unknown tags are passed over and counted. Refused with the line: a
-/// number that is missing or beyond 1e30, a tag that was cut, a vertex given twice or (where the
-/// file gives vertices) not at all, information that is not positive semi-definite, a quaternion of
-/// zero, a sensor's offset that is not the identity, a file with neither vertex nor edge. A
-/// rotation's information in g2o files is of the vector part of the quaternion; the factors have it
-/// of the rotation vector.
+/// Reads a graph; lines with unknown tags are skipped and counted. Refused with the line: a missing
+/// number or one beyond 1e30, a cut tag, a vertex defined twice or (where the file has vertices)
+/// not at all, information that is not positive semi-definite, a quaternion of zero, a sensor's
+/// offset that is not the identity, a file with neither vertex nor edge. In g2o files, information
+/// on a rotation refers to the vector part of the quaternion; in the factors to the rotation
+/// vector.
 std::variant<GraphFile, GraphFileError> read_graph(std::string_view text, GraphFormat format);
 
-/// The first vertex that the measurements do not tie to the first pose, and why: for solvers that
-/// hold one pose fast and place the others by motions. None where all are tied. Fixed vertices do
-/// not count. Cost: the edges.
+/// The first vertex that measurements do not connect to the first pose, with the reason: for
+/// solvers that fix one pose and place the others by motions. None where all are connected. Fixed
+/// vertices are not considered. Cost: the edges.
 std::optional<GraphFileError> find_untied(const GraphFile& file);
 
 }  // namespace understory::factor_graph::files

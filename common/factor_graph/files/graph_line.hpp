@@ -10,10 +10,10 @@
 
 namespace understory::factor_graph::files {
 
-/// Squares and products of numbers up to this one still are finite.
+/// Squares and products of numbers up to this limit are finite.
 constexpr double kGreatestNumber = 1e30;
 
-/// A line, word by word. What is wrong with its numbers is remembered.
+/// A line, word by word. It stores the fault of its numbers.
 class GraphLine {
  public:
   /// The text without its line feed; it must outlive the line.
@@ -28,7 +28,7 @@ class GraphLine {
     text_.remove_prefix(result.size());
     return result;
   }
-  /// The next number; a missing or malformed one is remembered.
+  /// The next number; a missing or malformed one is stored as a fault.
   double number() {
     const std::string_view one = word();
     double value = 0.0;
@@ -46,7 +46,7 @@ class GraphLine {
     if (std::abs(value) > 9e15 || value != std::floor(value)) is_whole_ = false;
     return is_whole_ ? static_cast<std::int64_t>(value) : 0;
   }
-  /// What is wrong with the numbers so far; none if nothing.
+  /// Fault of the numbers so far; none = no fault.
   std::optional<std::string> fault() const {
     if (!is_whole_) return "a number is missing or is none";
     if (!is_moderate_) return "a number is beyond 1e30";

@@ -1,4 +1,4 @@
-// Which vertices the measurements tie to the first pose.
+// Finds vertices that measurements do not connect to the first pose.
 #include <algorithm>
 #include <numeric>
 #include <string>
@@ -8,7 +8,7 @@
 namespace understory::factor_graph::files {
 namespace {
 
-/// Sets of vertices that are tied to each other.
+/// Sets of connected vertices.
 class Parts {
  public:
   explicit Parts(std::size_t vertices) : parent_(vertices) {
@@ -32,7 +32,7 @@ bool is_a_pose(const GraphFile::Vertex& vertex) {
   return vertex.type == graph::VariableType::kPose2 || vertex.type == graph::VariableType::kPose3;
 }
 
-/// Line of the first edge of a vertex; 0 = it has none.
+/// Line of the first edge of a vertex; 0 = none.
 int line_of(const GraphFile& file, std::size_t v) {
   for (std::size_t f = 0; f < file.factor_lines.size(); ++f) {
     if (end_of(file.factors[f], 0) == v || end_of(file.factors[f], 1) == v) {

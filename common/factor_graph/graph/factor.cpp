@@ -79,7 +79,7 @@ Factor prior(VariableId point, const Eigen::Vector3d& mean, const Eigen::Matrix3
 Factor relative(VariableId a, VariableId b, const geometry::SE2& a_T_b,
                 const Eigen::Matrix3d& information) {
   Factor factor = binary(FactorKind::kRelativePose2, a, b, information);
-  // With the rotation's cosine and sine, which every evaluation needs.
+  // Includes cosine and sine of the rotation for every evaluation.
   const Value value = value_of(a_T_b);
   factor.measurement = value;
   return factor;

@@ -1,4 +1,4 @@
-// Measurements between variables, as they are given to a factor graph.
+// Measurements between variables: the input of a factor graph.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,9 +10,8 @@
 
 namespace understory::factor_graph::graph {
 
-/// What is measured, with the residual e of each; a factor's cost is e' * information * e.
-/// `t`, `R`, `theta`: of a pose; `p`: a point; `z`: the measurement; vec: of a unit quaternion with
-/// w >= 0.
+/// Kind of measurement, with its residual e; a factor's cost is e' * information * e. `t`, `R`,
+/// `theta`: of a pose; `p`: a point; `z`: the measurement; vec: of a unit quaternion with w >= 0.
 enum class FactorKind : std::uint8_t {
   kPriorPose2,     ///< R_z' (t - t_z), theta - theta_z
   kPriorPose3,     ///< R_z' (t - t_z), 2 vec(q_z* q)
@@ -25,7 +24,7 @@ enum class FactorKind : std::uint8_t {
   kRangeBearing2,  ///< |R' (p - t)| - z_0 [m], direction of R' (p - t) - z_1 [rad]
   kPosition2,      ///< t + R * antenna - z: GNSS
   kPosition3,      ///< t + R * antenna - z
-  /// As kRelativePose2, of a motion whose rotation was measured too large by b * seconds; b: a
+  /// As kRelativePose2, for a motion whose measured rotation is too large by b * seconds; b: a
   /// scalar, the bias of the yaw rate [rad/s].
   kBiasedRelativePose2,
   kPriorScalar,  ///< b - z
@@ -59,28 +58,28 @@ LossValue evaluate(const Loss& loss, double squared_error);
 /// A factor of up to three variables.
 struct Factor {
   FactorKind kind = FactorKind::kPriorPose2;
-  int variable_count = 1;  ///< Used ones of `variables`.
+  int variable_count = 1;  ///< Number of used `variables`.
   std::array<VariableId, 3> variables{};
-  /// Numbers of z as in Value [m, rad]; then those that the kind names (antenna, seconds).
+  /// Numbers of z as in Value [m, rad]; then further ones by kind (antenna, seconds).
   std::array<double, 7> measurement{};
   /// Inverse covariance of the residual.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6> information;
   Loss loss;
 };
 
-/// Place of the seconds in a kBiasedRelativePose2's measurement; before it: that of a
-/// kRelativePose2.
+/// Index of the seconds in a kBiasedRelativePose2's measurement; the numbers before it are those of
+/// a kRelativePose2.
 constexpr std::size_t kBiasedSeconds = 5;
 
-// The rows of an information are those of the residual above. Angles in rad, lengths in m.
+// Rows of an information are in the order of the residual above. Angles in rad, lengths in m.
 
-/// A pose in the plane that is known.
+/// Prior on a pose in the plane.
 Factor prior(VariableId pose, const geometry::SE2& mean, const Eigen::Matrix3d& information);
-/// A pose in space that is known.
+/// Prior on a pose in space.
 Factor prior(VariableId pose, const Pose3& mean, const Eigen::Matrix<double, 6, 6>& information);
-/// A point in the plane that is known.
+/// Prior on a point in the plane.
 Factor prior(VariableId point, const Eigen::Vector2d& mean, const Eigen::Matrix2d& information);
-/// A point in space that is known.
+/// Prior on a point in space.
 Factor prior(VariableId point, const Eigen::Vector3d& mean, const Eigen::Matrix3d& information);
 /// A measured motion in the plane.
 Factor relative(VariableId a, VariableId b, const geometry::SE2& a_T_b,
@@ -88,11 +87,11 @@ Factor relative(VariableId a, VariableId b, const geometry::SE2& a_T_b,
 /// A measured motion in space.
 Factor relative(VariableId a, VariableId b, const Pose3& a_T_b,
                 const Eigen::Matrix<double, 6, 6>& information);
-/// A motion that took `seconds`, measured with an instrument whose yaw rate [rad/s] is too large by
-/// `bias`: the heading is off by bias * seconds, the path is rotated by half of that.
+/// A motion of `seconds`, measured with a yaw rate [rad/s] that is too large by `bias`: the heading
+/// error is bias * seconds, the path is rotated by half of that.
 Factor biased_relative(VariableId a, VariableId b, VariableId bias, const geometry::SE2& a_T_b,
                        double seconds, const Eigen::Matrix3d& information);
-/// A scalar that is known.
+/// Prior on a scalar.
 Factor prior(VariableId scalar, double mean, double information);
 /// Two scalars whose difference is noise with mean zero.
 Factor step(VariableId a, VariableId b, double information);
@@ -112,23 +111,23 @@ Factor position(VariableId pose, const Eigen::Vector2d& antenna, const Eigen::Ve
 Factor position(VariableId pose, const Eigen::Vector3d& antenna, const Eigen::Vector3d& measured,
                 const Eigen::Matrix3d& information);
 
-/// Condensed measurement: where `variables[1..]` (pose2: x, y, theta; point2: x, y) are in the
-/// frame of the pose `variables[0]`, with the joint information of all of them.
+/// Condensed measurement: `variables[1..]` (pose2: x, y, theta; point2: x, y) in the frame of the
+/// pose `variables[0]`, with their joint information.
 struct CondensedFactor {
   std::vector<VariableId> variables;  ///< At least two.
-  Eigen::VectorXd measurement;        ///< Of variables[1..], side by side [m, rad].
+  Eigen::VectorXd measurement;        ///< Of variables[1..], concatenated [m, rad].
   Eigen::MatrixXd information;        ///< Inverse covariance of `measurement`.
   Loss loss;
 };
 
-/// A factor that a program brings along.
+/// A factor defined by a program.
 class UserFactor {
  public:
   virtual ~UserFactor() = default;
   /// Rows of the residual.
   virtual int residual_dimension() const = 0;
   /// Whitened residual at `values` (one for each variable) and, unless null, its derivative:
-  /// column-major, the variables' columns side by side. A pose2 is perturbed in (x, y, theta) of
+  /// column-major, the columns of variable after variable. A pose2 is perturbed in (x, y, theta) of
   /// the world; a pose3 in its translation in the world and, on the right, in its rotation vector.
   virtual void evaluate(std::span<const Value> values, double* residual,
                         double* jacobian) const = 0;
@@ -138,10 +137,10 @@ class UserFactor {
 /// the measurement. Not for kUser.
 void evaluate(FactorKind kind, const double* data, std::span<const Value* const> values,
               std::span<const VariableType> types, double* residual, double* jacobian);
-/// Rows of the residual; 0 for kinds whose size depends on the data.
+/// Rows of the residual; 0 for kinds with a size that depends on the data.
 int residual_dimension(FactorKind kind);
-/// The types that a factor's variables must have; of condensed ones the first alone; none where any
-/// will do.
+/// The types required of a factor's variables; for condensed ones only of the first; none = any
+/// type.
 std::span<const VariableType> variable_types(FactorKind kind);
 
 }  // namespace understory::factor_graph::graph

@@ -26,7 +26,7 @@ struct Plane {
 };
 Plane plane(const Value& v) { return {{v[0], v[1]}, v[2], v[3], v[4]}; }
 
-/// R' v rotates back when R rotates: d(R' v) = -S (R' v) d theta.
+/// Derivative of R' v by the rotation of R: d(R' v) = -S (R' v) d theta.
 Vector2d turned_right(const Vector2d& v) { return {v.y(), -v.x()}; }
 
 struct Space {
@@ -70,8 +70,8 @@ void relative_pose2(const double* z, const Value& va, const Value& vb, double* e
       0, 0, -1, 0, 0, 1;
 }
 
-/// The measured motion at the true rate: its rotation less by b * seconds, its path rotated by half
-/// of it.
+/// The measured motion at the true rate: its rotation reduced by b * seconds, its path rotated back
+/// by half of that.
 void biased_relative_pose2(const double* z, const Value& va, const Value& vb, double bias,
                            double* e, double* j) {
   double by_poses[18];
@@ -179,7 +179,7 @@ void position3(const double* z, const Value& pose, double* e, double* j) {
   out << Matrix3d::Identity(), -rotation * cross_matrix(antenna);
 }
 
-/// All others in the first variable's frame.
+/// All other variables in the first variable's frame.
 void condensed2(const double* z, std::span<const Value* const> values,
                 std::span<const VariableType> types, double* e, double* j) {
   int rows = 0;

@@ -18,7 +18,7 @@ void require_finite(const Value& initial) {
     require(std::isfinite(number), "an initial estimate is not finite");
 }
 
-/// R with R' R = information; also of a singular one.
+/// R with R' R = information; also for a singular information.
 Eigen::MatrixXd root_of(const Eigen::Ref<const Eigen::MatrixXd>& information) {
   require(information.allFinite(), "an information matrix is not finite");
   const double size = information.cwiseAbs().maxCoeff();
@@ -181,7 +181,7 @@ FactorId FactorGraph::add(const Factor& factor) {
     mark_curved(id);
   }
 
-  // Nearly all factors of a map are observations in the plane: of two numbers.
+  // Nearly all factors of a map are observations in the plane, with two numbers.
   const std::span<const double> measurement(factor.measurement);
   store_data(id, factor.kind == FactorKind::kPoint2 ? measurement.first(2) : measurement,
              information);

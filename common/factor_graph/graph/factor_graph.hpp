@@ -1,4 +1,4 @@
-// Variables and factors with their linearisations: what the solvers work on.
+// Variables and factors with their linearisations: the data of the solvers.
 #pragma once
 
 #include <algorithm>
@@ -14,29 +14,29 @@
 
 namespace understory::factor_graph::graph {
 
-/// End of a list, or no such number.
+/// End of a list, or "no number".
 constexpr int kNone = -1;
 
-/// Who goes through many factors fetches the numbers of the one so many places ahead, and the
-/// record of the one twice as many ahead.
+/// A loop over many factors prefetches the numbers of the factor this many places ahead, and the
+/// record of the one twice as far ahead.
 constexpr std::size_t kFetchAhead = 8;
 
-/// A variable with its estimate. Fields marked (smoother) are kept for the incremental smoother.
+/// A variable with its estimate. The incremental smoother owns the fields marked (smoother).
 struct VariableRecord {
   VariableType type = VariableType::kPose2;
   bool in_use = false;          ///< False after its removal.
-  int clique = kNone;           ///< Where it is eliminated (smoother).
-  int first_incidence = kNone;  ///< List of its factors.
+  int clique = kNone;           ///< Clique that eliminates it (smoother).
+  int first_incidence = kNone;  ///< First entry of the list of its factors.
   int degree = 0;               ///< Length of that list.
-  Value base{};                 ///< Where its chart is; `delta` counts from here.
+  Value base{};                 ///< Base of its chart; `delta` is relative to it.
   Value value{};                ///< The estimate: base moved by delta.
   Delta delta{};                ///< The estimate in its chart.
-  /// Root of the largest information that one factor gives: of the translation [1/m], of the
-  /// rotation [1/rad]. Pivots and moves are measured against it.
+  /// Root of the largest information of one factor on the translation [1/m] and on the rotation
+  /// [1/rad]. Pivots and moves are compared with it.
   std::array<double, 2> scale{};
-  Delta judged{};        ///< `delta` when its factors were compared last (smoother).
+  Delta judged{};        ///< `delta` at the last comparison of its factors (smoother).
   double rotated = 0.0;  ///< Largest Deviation::rotated of its factors then [rad] (smoother).
-  /// A factor of its bends otherwise than rigid motions do (a bearing, a robust loss, a
+  /// One of its factors is nonlinear in more than rigid motions (a bearing, a robust loss, a
   /// user-defined one): any move can matter.
   bool is_curved = false;
 };
@@ -45,46 +45,47 @@ struct VariableRecord {
 struct IncidenceRecord {
   int factor = kNone;
   int variable = kNone;
-  int next = kNone;  ///< In the variable's list.
+  int next = kNone;  ///< Next entry in the variable's list.
   int previous = kNone;
 };
 
-/// A factor with its linearisation. What every update reads is in the first cache line: thousands
-/// of records are gone through, and each line of them is waited for.
+/// A factor with its linearisation. Fields that every update reads are in the first cache line: an
+/// update visits thousands of records and waits for each line.
 struct alignas(64) FactorRecord {
   FactorKind kind = FactorKind::kPriorPose2;
   RobustKernel kernel = RobustKernel::kNone;
   bool in_use = false;                  ///< False after its removal.
   bool is_pending = false;              ///< It waits to be linearised again (smoother).
-  int rows = 0;                         ///< Of the residual.
-  int columns = 0;                      ///< Of the Jacobian.
+  int rows = 0;                         ///< Rows of the residual.
+  int columns = 0;                      ///< Columns of the Jacobian.
   int variable_count = 0;               ///< Number of variables.
-  std::array<int, 2> few_incidences{};  ///< Of up to two variables.
+  std::array<int, 2> few_incidences{};  ///< Incidences of up to two variables.
   double* linear = nullptr;             ///< See FactorGraph::linearise().
   double* data = nullptr;               ///< Measurement, then the root of the information.
-  int* many_links = nullptr;            ///< Variables, then incidences, where there are more.
+  int* many_links = nullptr;            ///< Variables, then incidences, if there are more than two.
   int measurement_size = 0;             ///< Length of the measurement in `data`.
   int data_size = 0;                    ///< Length of `data`.
   double loss_width = 1.0;              ///< See Loss.
-  std::uint64_t linear_epoch = 0;       ///< Journal epoch in which `linear` was taken.
+  std::uint64_t linear_epoch = 0;       ///< Journal epoch in which `linear` was allocated.
   int user = kNone;                     ///< Number of the user-defined factor.
 
-  /// The loss as it was given.
+  /// The loss given to add().
   Loss loss() const { return {kernel, loss_width}; }
 };
 
-/// How far a factor is from its linearisation.
+/// Deviation of a factor from its linearisation.
 struct Deviation {
-  double residual = 0.0;    ///< Of the residual, and of its derivative times the residual [sigmas].
-  double rotated = 0.0;     ///< Rotation of its frame since then [rad].
+  /// Deviation of the residual, and of its derivative times the residual [sigmas].
+  double residual = 0.0;
+  double rotated = 0.0;     ///< Rotation of its frame since the linearisation [rad].
   double loss = 0.0;        ///< Loss of the factor.
   double linearised = 0.0;  ///< The same by the linearisation, up to a constant.
-  double left_out = 0.0;    ///< Part of the squared residual that the linearisation lacks.
+  double left_out = 0.0;    ///< Part of the squared residual missing in the linearisation.
 };
 
-/// Variables, factors and their linearisations, with undo to the last commit(). Every change costs
-/// what it touches. Not for use by several threads at a time, not even reading: evaluation shares
-/// scratch memory.
+/// Variables, factors and their linearisations, with undo to the last commit(). The cost of a
+/// change depends only on the changed part. Not thread-safe, not even for reading: evaluation
+/// shares scratch memory.
 ///
 /// More than 20 functions because it is a container: most are overloads and accessors.
 class FactorGraph {
@@ -112,10 +113,10 @@ class FactorGraph {
   VariableId add(VariableType type, const Value& initial);
 
   /// Adds a measurement, linearised at the estimates. The information must be symmetric and
-  /// positive semi-definite, everything finite. Throws std::invalid_argument where that, or a
-  /// variable's type, is not so.
+  /// positive semi-definite, everything finite. Throws std::invalid_argument where this or a
+  /// variable's type is violated.
   FactorId add(const Factor& factor);
-  /// Adds a condensed measurement; the same holds.
+  /// Adds a condensed measurement; with the same conditions.
   FactorId add(const CondensedFactor& factor);
   /// Adds a user-defined factor of these variables, which the graph keeps alive.
   FactorId add(std::shared_ptr<const UserFactor> factor, std::span<const VariableId> variables);
@@ -144,9 +145,9 @@ class FactorGraph {
     if (few[0] == kNone) return many_variables_of(factor);
     return {few.data(), few[1] == kNone ? std::size_t{1} : std::size_t{2}};
   }
-  /// Appends the factors of any variable for which `is_wanted` holds. O(factor_capacity()), which
-  /// is less than to follow the lists of many variables: it reads eight bytes for each factor, as
-  /// they lie in memory.
+  /// Appends the factors of any variable for which `is_wanted` holds. O(factor_capacity()): for
+  /// many variables this is faster than following their lists, because it reads eight bytes per
+  /// factor in memory order.
   template <typename IsWanted>
   void list_factors(const IsWanted& is_wanted, std::vector<int>& found) const {
     for (int f = 0; f < factor_capacity(); ++f) {
@@ -157,7 +158,7 @@ class FactorGraph {
       if (is_found) found.push_back(f);
     }
   }
-  /// What was measured, see FactorKind.
+  /// The measurement, see FactorKind.
   std::span<const double> measurement(FactorId id) const;
   /// The information as it was given, up to rounding. Not of kUser.
   Eigen::MatrixXd information(FactorId id) const;
@@ -170,35 +171,35 @@ class FactorGraph {
   double chi2() const;
 
   /// Linearises at the estimate. `linear` then is [J (rows x columns, column-major) | b (rows) |
-  /// four numbers to judge its age by], whitened and weighted: cost = |J delta - b|^2.
+  /// four numbers for deviation()], whitened and weighted: cost = |J delta - b|^2.
   void linearise(int factor);
-  /// The factor at the estimate against its linearisation.
+  /// Deviation of the factor at the estimate from its linearisation.
   Deviation deviation(int factor) const;
-  /// Bound on what the deviation of a factor of this variable grew by, from its moves since the
-  /// factors were last looked at [sigmas]. Infinite where there is none.
+  /// Bound on the growth of the deviation of a factor of this variable, from its moves since the
+  /// last comparison [sigmas]. Infinite = no bound.
   double unjudged_deviation(int variable) const;
   /// Moves the variable in its chart to `delta`.
   void move(int variable, const double* delta);
   /// Makes the estimate the base of the chart. Its factors must be linearised again.
   void rebase(int variable);
-  /// Sets an estimate from elsewhere, which becomes the base, too.
+  /// Sets an estimate, which also becomes the base.
   void set_value(int variable, const Value& value);
-  /// A new estimate of a variable without factors, as if it had been added now. Throws
+  /// Gives a variable without factors a new estimate, like a new variable. Throws
   /// std::invalid_argument where it has factors, or where the estimate is not finite.
   void restart(int variable, const Value& initial);
-  /// Measures a variable's pivots against the factors that it has now: far stronger ones were
-  /// removed. O(its factors).
+  /// Sets a variable's scale from its present factors, after far stronger ones were removed. O(its
+  /// factors).
   void renew_scale(int variable);
 
-  /// Begins to fetch a factor's record into the processor's cache: a list of factors is anywhere in
-  /// memory, and to wait for each of them takes longer than what is done with it.
+  /// Prefetches a factor's record into the processor's cache: the factors of a list are spread over
+  /// memory, and waiting for each takes longer than its computation.
   void fetch_record(int factor) const { __builtin_prefetch(&factors_[factor]); }
-  /// The same of its linearisation, once the record is there.
+  /// The same for its linearisation, after the record has arrived.
   void fetch_linear(int factor) const {
     __builtin_prefetch(factors_[factor].linear);
     __builtin_prefetch(factors_[factor].linear + 8);
   }
-  /// The same of all its numbers.
+  /// The same for all its numbers.
   void fetch_numbers(int factor) const {
     fetch_linear(factor);
     __builtin_prefetch(factors_[factor].data);
@@ -217,7 +218,7 @@ class FactorGraph {
 
   /// Makes all changes final.
   void commit();
-  /// Restores the state of the last commit(), exactly; costs what changed.
+  /// Restores the state of the last commit(), exactly; at the cost of the changes.
   void rollback();
   /// Memory taken from the system for measurements and linearisations [bytes].
   std::size_t bytes() const { return pool_.bytes(); }
@@ -245,13 +246,14 @@ class FactorGraph {
 
   storage::JournaledTable<VariableRecord> variables_;
   storage::JournaledTable<FactorRecord> factors_;
-  /// Per factor of up to two variables these, kNone where it has no second; else kNone, kNone.
+  /// The variables of each factor with at most two; kNone = no second one; kNone, kNone for larger
+  /// factors.
   std::vector<std::array<int, 2>> variables_of_;
   struct Removed {
     int factor;
     std::array<int, 2> few;
   };
-  std::vector<Removed> removed_;  ///< Since the last commit.
+  std::vector<Removed> removed_;  ///< Removed since the last commit.
   storage::JournaledTable<IncidenceRecord> incidences_;
   storage::BlockPool<double> pool_;
   storage::BlockPool<int> links_;

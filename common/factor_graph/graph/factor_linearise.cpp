@@ -1,4 +1,4 @@
-// Linearisation of factors, and how it ages.
+// Linearisation of factors, and its deviation.
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -35,7 +35,8 @@ void with_sizes(int rows, int columns, F&& f) {
   }
 }
 
-/// From a pose's own frame into its chart: the right Jacobian of its rotation.
+/// Transforms a Jacobian from a pose's own frame into its chart, by the right Jacobian of its
+/// rotation.
 void into_chart(const VariableRecord& variable, double* columns, int rows) {
   if (variable.type != VariableType::kPose3) return;
   const Map<const Eigen::Vector3d> vector(variable.delta.data() + 3);
@@ -179,7 +180,7 @@ void FactorGraph::linearise(int id) {
     }
   }
 
-  // What its age is judged by.
+  // Numbers for deviation().
   const Eigen::Vector3d rotation = rotation_of(variables_[variables[0]]);
   double* age = b + rows;
   age[0] = root_weight;
@@ -194,7 +195,8 @@ void FactorGraph::copy_moves(std::span<const int> variables, double* to) const {
   }
 }
 
-/// deviation() of an observation in the plane without a robust loss: nearly all factors of a map.
+/// deviation() of an observation in the plane without a robust loss: the case of nearly all factors
+/// of a map.
 Deviation FactorGraph::deviation_of_point2(const FactorRecord& record,
                                            std::span<const int> names) const {
   const VariableRecord& pose = variables_[names[0]];

@@ -9,7 +9,7 @@ namespace understory::factor_graph::graph {
 /// A pose in space, `a_T_b` like SE2. A tangent vector is (x, y, z [m], then a rotation vector
 /// [rad]), both in the pose's own frame.
 struct Pose3 {
-  /// Of the origin of b in a [m].
+  /// Position of the origin of b in a [m].
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   /// Unit quaternion from b to a.
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
@@ -23,7 +23,7 @@ struct Pose3 {
   Pose3 operator*(const Pose3& other) const {
     return {translation + rotation * other.translation, (rotation * other.rotation).normalized()};
   }
-  /// The point in a of a point in b [m].
+  /// Transforms a point [m] from b to a.
   Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
     return rotation * point + translation;
   }

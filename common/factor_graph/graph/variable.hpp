@@ -1,4 +1,4 @@
-// Variables of a factor graph, and where they are.
+// Variables of a factor graph and their values.
 #pragma once
 
 #include <array>
@@ -9,9 +9,9 @@
 
 namespace understory::factor_graph::graph {
 
-/// Number of a variable in its graph. A removed one's number is given out again.
+/// Number of a variable in its graph. The number of a removed variable is reused.
 enum class VariableId : std::int32_t {};
-enum class FactorId : std::int32_t {};  ///< The same of a factor.
+enum class FactorId : std::int32_t {};  ///< Number of a factor; likewise reused.
 /// The number itself.
 constexpr int index(VariableId id) { return static_cast<int>(id); }
 /// The number itself.
@@ -25,7 +25,7 @@ constexpr int dimension(VariableType type) {
   constexpr std::array<int, 5> dimensions{3, 6, 2, 3, 1};
   return dimensions[static_cast<std::size_t>(type)];
 }
-/// Of a pose3.
+/// That of a pose3.
 constexpr int kMaxVariableDimension = 6;
 
 /// Numbers of a variable's value:
@@ -35,9 +35,9 @@ constexpr int kMaxVariableDimension = 6;
 ///   scalar: itself, in a unit of its own
 using Value = std::array<double, 7>;
 
-/// Where a variable is, in a chart about its `base`: (x, y, theta) of a pose2 and the coordinates
-/// of points are added; a pose3 is (translation + d[0..2], rotation * Exp(d[3..5])). In the plane
-/// this chart is flat, so nothing is lost by staying at one base for ever.
+/// Coordinates of a variable in a chart about its `base`: (x, y, theta) of a pose2 and the
+/// coordinates of points are added; a pose3 is (translation + d[0..2], rotation * Exp(d[3..5])). In
+/// the plane this chart is exact at any distance, so the base need not change.
 using Delta = std::array<double, kMaxVariableDimension>;
 
 /// Numbers of a pose in the plane.

@@ -1,4 +1,4 @@
-// Which members of a plane graph go into a saved state.
+// The members of a plane graph in a saved state.
 #pragma once
 
 #include "common/factor_graph/plane/graph.hpp"

@@ -1,4 +1,4 @@
-// What the smoother keeps beside its graph, each list able to go back to the checkpoint.
+// Lists of the smoother beside its graph; each can return to the checkpoint.
 #pragma once
 
 #include <cstddef>
@@ -13,14 +13,14 @@
 
 namespace understory::factor_graph::plane {
 
-/// Stands for a measurement that has no factor in the graph.
+/// Marks a measurement without a factor in the graph.
 inline constexpr graph::FactorId kNoFactor{graph::kNone};
 
-/// A list that is appended to, with its length at the checkpoint.
+/// A list that only grows, with its length at the checkpoint.
 template <typename T>
 class AppendList {
  public:
-  /// Appends.
+  /// Appends an entry.
   void push_back(const T& item) { items_.push_back(item); }
   /// Number of entries.
   std::size_t size() const { return items_.size(); }
@@ -28,9 +28,9 @@ class AppendList {
   const T& operator[](std::size_t at) const { return items_[at]; }
   /// All entries in their order.
   const std::vector<T>& items() const { return items_; }
-  /// The checkpoint is now.
+  /// Sets the checkpoint.
   void commit() { saved_size_ = items_.size(); }
-  /// Back to the checkpoint.
+  /// Returns to the checkpoint.
   void rollback() { items_.resize(saved_size_); }
 
  private:
@@ -38,7 +38,7 @@ class AppendList {
   std::size_t saved_size_ = 0;
 };
 
-/// Poses, each a variable of the graph or where it was left.
+/// Poses: each is a variable of the graph, or a parked pose with its last estimate.
 class PoseList {
  public:
   /// One pose.
@@ -48,7 +48,7 @@ class PoseList {
   };
   /// Appends a variable.
   void push_back(graph::VariableId name) { entries_.push_back({name, {}}); }
-  /// Puts another entry in its place; rollback() brings the old one back.
+  /// Replaces an entry; rollback() restores it.
   void replace(std::size_t at, const Entry& entry) {
     changes_.emplace_back(at, entries_[at]);
     entries_[at] = entry;
@@ -57,16 +57,16 @@ class PoseList {
   std::size_t size() const { return entries_.size(); }
   /// Entry with this index.
   const Entry& operator[](std::size_t at) const { return entries_[at]; }
-  /// Whether it is no variable.
+  /// Whether the pose is parked, so that it is no variable.
   bool is_parked(PoseId id) const {
     return entries_[index(id)].name == graph::VariableId{graph::kNone};
   }
-  /// The checkpoint is now.
+  /// Sets the checkpoint.
   void commit() {
     changes_.clear();
     saved_size_ = entries_.size();
   }
-  /// Back to the checkpoint.
+  /// Returns to the checkpoint.
   void rollback() {
     for (; !changes_.empty(); changes_.pop_back())
       entries_[changes_.back().first] = changes_.back().second;
@@ -74,26 +74,26 @@ class PoseList {
   }
 
  private:
-  std::deque<Entry> entries_;                           ///< By blocks: parked ones are many.
-  std::vector<std::pair<std::size_t, Entry>> changes_;  ///< Since the checkpoint.
+  std::deque<Entry> entries_;  ///< In blocks, because there are many parked poses.
+  std::vector<std::pair<std::size_t, Entry>> changes_;  ///< Changes since the checkpoint.
   std::size_t saved_size_ = 0;
 };
 
-/// Measurements that can also be replaced.
+/// Measurements, which can be replaced.
 template <typename Measured>
 class FactorList {
  public:
   /// One measurement.
   struct Entry {
     Measured measured;
-    graph::FactorId factor = kNoFactor;  ///< None where it does not count.
+    graph::FactorId factor = kNoFactor;  ///< None where the information is zero.
   };
-  /// Appends.
+  /// Appends a measurement.
   void push_back(const Entry& entry) {
     storage::make_room(entries_);
     entries_.push_back(entry);
   }
-  /// Puts another measurement in its place; rollback() brings the old one back.
+  /// Replaces a measurement; rollback() restores it.
   void replace(std::size_t at, const Entry& entry) {
     storage::make_room(changes_);
     changes_.push_back({at, entries_[at]});
@@ -110,12 +110,12 @@ class FactorList {
     for (const Entry& one : entries_) all.push_back(one.measured);
     return all;
   }
-  /// The checkpoint is now.
+  /// Sets the checkpoint.
   void commit() {
     changes_.clear();
     saved_size_ = entries_.size();
   }
-  /// Back to the checkpoint.
+  /// Returns to the checkpoint.
   void rollback() {
     for (std::size_t i = changes_.size(); i-- > 0;) entries_[changes_[i].at] = changes_[i].before;
     changes_.clear();
@@ -128,20 +128,20 @@ class FactorList {
     Entry before;
   };
   std::vector<Entry> entries_;
-  std::vector<Change> changes_;  ///< Since the checkpoint.
+  std::vector<Change> changes_;  ///< Changes since the checkpoint.
   std::size_t saved_size_ = 0;
 };
 
 /// Poses and points that updates moved since the checkpoint, each once.
 class MovedList {
  public:
-  /// The variable is the pose or the point with this index.
+  /// Registers the variable as the pose or the point with this index.
   void give_role(graph::VariableId name, std::size_t role) {
     const auto at = static_cast<std::size_t>(index(name));
     if (roles_.size() <= at) roles_.resize(at + 1);
     roles_[at] = {static_cast<std::uint32_t>(role), false};
   }
-  /// Adds what the last update moved.
+  /// Adds the variables that the last update moved.
   void collect(const bayes_tree::IncrementalSmoother& smoother) {
     for (const int v : smoother.moved()) {
       const graph::VariableType type = smoother.graph().type(graph::VariableId(v));
@@ -158,7 +158,7 @@ class MovedList {
       }
     }
   }
-  /// Nothing has moved.
+  /// Clears the list.
   void clear() {
     for (const int v : moved_) roles_[static_cast<std::size_t>(v)].is_moved = false;
     moved_.clear();
@@ -172,10 +172,10 @@ class MovedList {
 
  private:
   struct Role {
-    std::uint32_t index = 0;  ///< Among the poses, or among the points.
+    std::uint32_t index = 0;  ///< Index among the poses, or among the points.
     bool is_moved = false;
   };
-  std::vector<Role> roles_;  ///< Per variable; of scalars unused.
+  std::vector<Role> roles_;  ///< Per variable; unused for scalars.
   std::vector<int> moved_;   ///< Variables.
   std::vector<PoseId> poses_;
   std::vector<PointId> points_;

@@ -13,9 +13,9 @@ using Block = Eigen::Matrix<double, 3, 2>;
 
 /// Least pivot of a determined system [1/m^2, 1/rad^2].
 constexpr double kLeastPivot = 1e-4;
-/// Least information on a bias that is one [1/(rad/s)^2].
+/// Least information on a bias; less counts as none [1/(rad/s)^2].
 constexpr double kLeastBiasInformation = 1.0;
-/// Fewest points that have a motion in common.
+/// Fewest points that define a common motion.
 constexpr std::size_t kLeastPoints = 3;
 
 /// An observation's share of the normal equations: pose' * point.
@@ -26,7 +26,7 @@ struct Cross {
 
 /// A point of the normal equations.
 struct PointBlock {
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< With the poses given [m^2].
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Covariance for given poses [m^2].
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
   std::vector<Cross> observed;
@@ -48,7 +48,7 @@ class PartSystem {
     for (const RelativePose& factor : part_.relative_poses) add(factor, linearise(part_, factor));
     for (const BiasedRelativePose& factor : part_.biased_relative_poses) add(factor);
     if (!add_points()) return false;
-    if (information_.size() == 0) return true;  // The fixed pose is the only one.
+    if (information_.size() == 0) return true;  // There is only the fixed pose.
 
     const Eigen::LLT<Eigen::MatrixXd> factorised(information_);
     if (factorised.info() != Eigen::Success) return false;
@@ -57,7 +57,7 @@ class PartSystem {
     covariance_ = factorised.solve(Eigen::MatrixXd::Identity(l.rows(), l.cols()));
     step_ = factorised.solve(-gradient_);
 
-    // The bias, with the poses eliminated.
+    // Solve for the bias, with the poses eliminated.
     by_bias_ = factorised.solve(-bias_cross_);
     bias_information_ += bias_cross_.dot(by_bias_);
     bias_gradient_ += bias_cross_.dot(step_);
@@ -65,7 +65,7 @@ class PartSystem {
   }
 
   std::size_t fixed() const { return fixed_; }
-  /// Joint covariance of the poses' moves but for the fixed one's.
+  /// Joint covariance of the poses' moves, without the fixed pose.
   const Eigen::MatrixXd& covariance() const { return covariance_; }
   /// The poses' moves to the optimum.
   const Eigen::VectorXd& step() const { return step_; }
@@ -73,15 +73,15 @@ class PartSystem {
   const Eigen::VectorXd& by_bias() const { return by_bias_; }
   /// Information on the bias.
   double bias_information() const { return bias_information_; }
-  /// Its move to the optimum, where there is information on it.
+  /// Move of the bias to the optimum, where there is information on it.
   double bias_step() const { return -bias_gradient_ / bias_information_; }
   const PointBlock& point(std::size_t i) const { return points_[i]; }
-  /// Row of a pose in the system; none of the fixed one.
+  /// Row of a pose in the system; none for the fixed pose.
   std::optional<Index> row(std::size_t pose) const {
     if (pose == fixed_) return std::nullopt;
     return 3 * static_cast<Index>(pose < fixed_ ? pose : pose - 1);
   }
-  /// How a point follows a pose that observed it: d(point)/d(pose).
+  /// Derivative of a point by a pose that observed it: d(point)/d(pose).
   Eigen::Matrix<double, 2, 3> follows(std::size_t point, const Cross& cross) const {
     return -points_[point].covariance * cross.block.transpose();
   }
@@ -110,7 +110,7 @@ class PartSystem {
     add_gradient(b, weighted_b.transpose() * j.residual);
   }
 
-  /// The motion at the bias's value, and how its residual follows the bias.
+  /// Adds the motion at the present bias, and the derivative of its residual by the bias.
   void add(const BiasedRelativePose& factor) {
     const RelativePose& motion = factor.motion;
     const double bias = part_[factor.bias];
@@ -133,7 +133,7 @@ class PartSystem {
     bias_gradient_ += weighted.dot(j.residual);
   }
 
-  /// Schur's complement of the points.
+  /// Adds the Schur complement of the points.
   bool add_points() {
     for (const PointObservation& factor : part_.observations) {
       const ObservationJacobian j = linearise(part_, factor);
@@ -180,10 +180,10 @@ Eigen::Matrix<double, 2, 3> rigid(const Eigen::Vector2d& in_frame) {
   return j;
 }
 
-/// How the frame that the points have in common follows the poses: the fit of a rigid motion to the
-/// points' moves, weighted by what is known of each when the poses are given.
+/// Derivative of the points' common frame by the poses: the fit of a rigid motion to the points'
+/// moves, weighted by each point's information for given poses.
 Eigen::MatrixXd common_motion(const Graph& part, const PartSystem& system) {
-  const Eigen::Index size = system.step().size();  // 0 where the middle pose is the only one.
+  const Eigen::Index size = system.step().size();  // 0 if the middle pose is the only pose.
   if (size == 0 || part.points.size() < kLeastPoints) return Eigen::MatrixXd::Zero(3, size);
   const geometry::SE2 middle_T_map = part.poses[system.fixed()].inverse();
   const Eigen::Matrix2d to_middle = middle_T_map.rotation();
@@ -207,14 +207,14 @@ Eigen::MatrixXd common_motion(const Graph& part, const PartSystem& system) {
   return solver.solve(motion);
 }
 
-/// A pose relative to the origin: `common` is how the origin follows the poses, `spread` common *
-/// covariance.
+/// A pose relative to the origin: `common`: derivative of the origin by the poses; `spread`: common
+/// * covariance.
 geometry::SE2WithCovariance relative(const Graph& part, const PartSystem& system,
                                      const Eigen::MatrixXd& common, const Eigen::MatrixXd& spread,
                                      const geometry::SE2& map_T_origin, std::size_t pose) {
   geometry::SE2 map_T_pose = part.poses[pose];
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();  // pose with origin
+  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();  // between pose and origin
   if (const auto at = system.row(pose)) {
     map_T_pose = map_T_pose * geometry::SE2::Exp(system.step().segment<3>(*at));
     covariance = system.covariance().block<3, 3>(*at, *at);
@@ -230,7 +230,7 @@ geometry::SE2WithCovariance relative(const Graph& part, const PartSystem& system
   return result;
 }
 
-/// An outer pose, and how it follows the bias.
+/// An outer pose and its derivative by the bias.
 CondensedMotion motion_of(const Graph& part, const PartSystem& system,
                           const Eigen::MatrixXd& common, const Eigen::MatrixXd& spread,
                           const geometry::SE2& map_T_origin, std::size_t pose) {
@@ -241,7 +241,8 @@ CondensedMotion motion_of(const Graph& part, const PartSystem& system,
   return result;
 }
 
-/// The points relative to the origin: each one's own error, and what the poses' errors bend.
+/// The points relative to the origin: each one's own error, and the deformation by the poses'
+/// errors.
 std::vector<CondensedPoint> points_of(const Graph& part, const PartSystem& system,
                                       const Eigen::MatrixXd& common,
                                       const geometry::SE2& map_T_origin) {
@@ -251,7 +252,7 @@ std::vector<CondensedPoint> points_of(const Graph& part, const PartSystem& syste
   Eigen::MatrixXd bends(2 * static_cast<Index>(result.size()), common.cols());
 
   for (std::size_t i = 0; i < result.size(); ++i) {
-    // Where the part's own factors have it.
+    // Position by the part's own factors.
     const PointBlock& point = system.point(i);
     Eigen::Vector2d position = part.points[i] - point.covariance * point.gradient;
     auto bend = bends.middleRows<2>(2 * static_cast<Index>(i));
@@ -267,7 +268,7 @@ std::vector<CondensedPoint> points_of(const Graph& part, const PartSystem& syste
     result[i].covariance = to_origin * point.covariance * to_origin.transpose();
   }
 
-  // Of all points at once: the poses' covariance is the large one of the factors.
+  // For all points at once, because the poses' covariance is the large matrix of the product.
   const Eigen::MatrixXd spreads = bends * system.covariance();
   for (std::size_t i = 0; i < result.size(); ++i) {
     const auto row = 2 * static_cast<Index>(i);

@@ -5,7 +5,7 @@
 namespace understory::factor_graph::plane {
 namespace {
 
-/// Translation and rotation apart, as pose graphs are usually given.
+/// Error with separate translation and rotation, as is usual for pose graphs.
 Eigen::Vector3d split_error(const geometry::SE2& measured, const geometry::SE2& actual) {
   return (measured.inverse() * actual).coordinates();
 }
@@ -60,7 +60,7 @@ geometry::SE2 at_true_rate(const geometry::SE2& measured, double bias, double se
 double chi2(const Graph& graph, const BiasedRelativePose& factor) {
   const RelativePose& motion = factor.motion;
   const double bias = graph[factor.bias];
-  // In the axes of the motion as it was measured, as the smoother's factor has it.
+  // In the axes of the measured motion, as in the smoother's factor.
   Eigen::Vector3d e = split_error(motion.a_T_b, graph[motion.a].inverse() * graph[motion.b]);
   const geometry::SE2 shift =
       motion.a_T_b.inverse() * at_true_rate(motion.a_T_b, bias, factor.seconds);

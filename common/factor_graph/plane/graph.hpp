@@ -104,20 +104,20 @@ struct Graph {
 
 /// Whitened squared error of one factor at the graph's values.
 double chi2(const Graph& graph, const PosePrior& factor);
-/// Likewise.
+/// As for PosePrior.
 double chi2(const Graph& graph, const RelativePose& factor);
-/// Likewise.
+/// As for PosePrior.
 double chi2(const Graph& graph, const PointPrior& factor);
-/// Likewise.
+/// As for PosePrior.
 double chi2(const Graph& graph, const BiasedRelativePose& factor);
-/// Likewise.
+/// As for PosePrior.
 double chi2(const Graph& graph, const ScalarPrior& factor);
-/// Likewise.
+/// As for PosePrior.
 double chi2(const Graph& graph, const ScalarStep& factor);
-/// Likewise.
+/// As for PosePrior.
 double chi2(const Graph& graph, const PointObservation& factor);
-/// The measured motion without the bias [rad/s] of the instrument's yaw rate: the heading less by
-/// bias * seconds, the path rotated by half of that.
+/// The measured motion corrected for the bias [rad/s] of the yaw rate: the heading is reduced by
+/// bias * seconds, the path is rotated back by half of that.
 geometry::SE2 at_true_rate(const geometry::SE2& measured, double bias, double seconds);
 /// Sum over all factors. O(factors).
 double chi2(const Graph& graph);
@@ -129,9 +129,9 @@ struct ObservationJacobian {
   Eigen::Matrix<double, 2, 3> pose;
   Eigen::Matrix2d point;
 };
-/// At the graph's values, not whitened.
+/// Linearises at the graph's values, not whitened.
 ObservationJacobian linearise(const Graph& graph, const PointObservation& factor);
-/// Of pose^-1 * point, with position zero.
+/// Linearises pose^-1 * point, with position zero.
 ObservationJacobian linearise(const geometry::SE2& pose, const Eigen::Vector2d& point);
 
 /// Residual of a relative pose with its Jacobians; 3 x 3 each, right perturbations.
@@ -140,7 +140,7 @@ struct RelativePoseJacobian {
   Eigen::Matrix3d a;
   Eigen::Matrix3d b;
 };
-/// At the graph's values, not whitened.
+/// Linearises at the graph's values, not whitened.
 RelativePoseJacobian linearise(const Graph& graph, const RelativePose& factor);
 
 }  // namespace understory::factor_graph::plane

@@ -1,4 +1,4 @@
-// A graph of the plane solved whole.
+// Batch solution of a graph in the plane.
 #pragma once
 
 #include "common/factor_graph/batch/batch.hpp"
@@ -6,8 +6,8 @@
 
 namespace understory::factor_graph::plane {
 
-/// Moves the graph's values to the optimum that they lead to; what has no factor stays. On an error
-/// the values are the last good ones. Costs some factorisations of the whole.
+/// Moves the graph's values to their local optimum; variables without factors stay. After an error
+/// the values are the last good ones. Costs some factorisations of the whole graph.
 batch::BatchReport optimise(Graph& graph, const batch::BatchParameters& parameters = {});
 
 }  // namespace understory::factor_graph::plane

@@ -46,7 +46,7 @@ struct Smoother::State {
     return smoother.add(graph::step(name(factor.a), name(factor.b), factor.information));
   }
 
-  /// Appends the measurement and gives its number.
+  /// Appends the measurement and returns its number.
   template <typename Id, typename Measured>
   Id append(FactorList<Measured>& list, const Measured& factor) {
     list.push_back({factor, give(factor)});
@@ -92,9 +92,9 @@ struct Smoother::State {
   FactorList<ScalarStep> scalar_steps;
   FactorList<PointObservation> observations;
   std::vector<graph::FactorId> condensed;
-  std::vector<graph::FactorId> saved_condensed;  ///< At the checkpoint.
+  std::vector<graph::FactorId> saved_condensed;  ///< `condensed` at the checkpoint.
   std::optional<graph::FactorId> held;
-  std::optional<graph::FactorId> saved_held;  ///< At the checkpoint.
+  std::optional<graph::FactorId> saved_held;  ///< `held` at the checkpoint.
   MovedList moved;
 };
 
@@ -326,7 +326,7 @@ std::optional<Eigen::MatrixXd> Smoother::joint_marginal(std::span<const PoseId> 
 Marginals Smoother::marginals(std::span<const PoseId> poses,
                               std::span<const PointId> points) const {
   std::vector<graph::VariableId> names;
-  std::vector<std::size_t> solved;  // Of the poses.
+  std::vector<std::size_t> solved;  // Indices of poses.
   names.reserve(poses.size() + points.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (state_->poses.is_parked(poses[i])) continue;

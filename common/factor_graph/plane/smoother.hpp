@@ -13,18 +13,18 @@
 
 namespace understory::factor_graph::plane {
 
-/// Where poses are in the frame of the first of them, measured together.
+/// Joint measurement of poses in the frame of the first of them.
 struct CondensedPoses {
   std::vector<PoseId> poses;                 ///< At least two.
-  std::vector<geometry::SE2> first_T_other;  ///< Of poses[1..].
-  /// Of first_T_other, side by side: right perturbations, x, y, theta each [m, rad].
+  std::vector<geometry::SE2> first_T_other;  ///< Poses[1..] in the frame of poses[0].
+  /// Joint information on first_T_other: right perturbations, x, y, theta each [m, rad].
   Eigen::MatrixXd information;
 };
 
-/// What an update found.
+/// Result of an update.
 struct SmootherUpdate {
   bool ok = false;    ///< False: variables are undetermined and stay where they are.
-  std::string error;  ///< Names the variables that the measurements leave undetermined.
+  std::string error;  ///< Message with the variables that the measurements do not determine.
 };
 
 /// Covariances of single variables.
@@ -33,7 +33,7 @@ struct Marginals {
   std::vector<Eigen::Matrix2d> points;  ///< [m^2]
 };
 
-/// Index of a PointObservation in the order in which they were added.
+/// Index of a PointObservation in the order of adding.
 enum class ObservationId : std::uint32_t {};
 /// Index of a RelativePose, likewise.
 enum class MotionId : std::uint32_t {};
@@ -48,9 +48,9 @@ template <typename Id>
 requires std::is_enum_v<Id>
 constexpr std::uint32_t index(Id id) { return static_cast<std::uint32_t>(id); }
 
-/// Keeps a graph and its least-squares solution; the incremental smoother does the work. An update
-/// and a rollback cost what changed. Factors must name variables of this smoother; see
-/// graph::FactorGraph::add() for what throws.
+/// A graph and its least-squares solution, computed by the incremental smoother. Updates and
+/// rollbacks cost the changes. Factors must refer to variables of this smoother; see
+/// graph::FactorGraph::add() for exceptions.
 ///
 /// More than 20 functions because it is a facade: half of them are overloads and accessors.
 class Smoother {
@@ -66,31 +66,29 @@ class Smoother {
   PointId add_point(const Eigen::Vector2d& initial);
   /// Adds a scalar at this estimate.
   ScalarId add_scalar(double initial);
-  /// A new estimate of a variable that no factor names: so its number serves another one, and a
-  /// graph whose variables come and go does not grow. Throws std::invalid_argument where a factor
-  /// names it.
+  /// Gives a variable without factors a new estimate, so that its number serves for a new variable
+  /// and the graph does not grow. Throws std::invalid_argument where it has a factor.
   void restart(PoseId id, const geometry::SE2& initial);
-  /// Likewise.
+  /// The same for a point.
   void restart(PointId id, const Eigen::Vector2d& initial);
-  /// Likewise.
+  /// The same for a scalar.
   void restart(ScalarId id, double initial);
 
-  /// Takes a pose that no factor names out of what is solved: it keeps its number and its estimate,
-  /// and takes 32 bytes. Nothing but pose() and unpark() may be asked of it until it is back;
-  /// marginals have nothing of it. Throws std::invalid_argument where a factor names it, or where
-  /// it is parked.
+  /// Removes a pose without factors from the system: it keeps its number and its estimate, and
+  /// needs 32 bytes. Only pose() and unpark() are allowed for it until unpark(); marginals do not
+  /// include it. Throws std::invalid_argument where it has a factor or is parked.
   void park(PoseId id);
-  /// Puts it back. Throws std::invalid_argument where it is not parked.
+  /// Returns a parked pose to the system. Throws std::invalid_argument where it is not parked.
   void unpark(PoseId id);
 
-  /// Whether no factor names the point.
+  /// Whether the point has no factor.
   bool is_free(PointId id) const;
 
   /// Adds a measured pose.
   void add(const PosePrior& factor);
   /// Adds a measured point.
   void add(const PointPrior& factor);
-  /// Adds a measured motion. This and the following do not count where their information is zero.
+  /// Adds a measured motion. This and the following are ignored where their information is zero.
   MotionId add(const RelativePose& factor);
   /// Adds a motion measured with a bias.
   BiasedMotionId add(const BiasedRelativePose& factor);
@@ -100,32 +98,32 @@ class Smoother {
   ScalarStepId add(const ScalarStep& factor);
   /// Adds an observation.
   ObservationId add(const PointObservation& factor);
-  /// Replaces a measurement by another one, of the same variables or of others.
+  /// Replaces a measurement by another one, on the same variables or others.
   void set(MotionId id, const RelativePose& factor);
-  /// Likewise.
+  /// The same for a motion with a bias.
   void set(BiasedMotionId id, const BiasedRelativePose& factor);
-  /// Likewise.
+  /// The same for a prior on a scalar.
   void set(ScalarPriorId id, const ScalarPrior& factor);
-  /// Likewise.
+  /// The same for the drift of a scalar.
   void set(ScalarStepId id, const ScalarStep& factor);
-  /// Likewise.
+  /// The same for an observation.
   void set(ObservationId id, const PointObservation& factor);
 
-  /// Holds this pose where it is said to be, to a micrometre and a microradian, in the place of the
-  /// one that was held before: the gauge. It is not in graph().
+  /// Fixes the gauge: holds this pose at `mean` to a micrometre and a microradian, and releases the
+  /// pose held before. This prior is not in graph().
   void hold(PoseId id, const geometry::SE2& mean);
-  /// Puts these measurements in the place of those that were set before. They are not in graph().
+  /// Replaces all condensed measurements set before. They are not in graph().
   void set_condensed(std::span<const CondensedPoses> measured);
 
-  /// The measurement as it was given last.
+  /// The latest value of the measurement.
   const RelativePose& motion(MotionId id) const;
-  /// Likewise.
+  /// The latest value of the measurement.
   const BiasedRelativePose& motion(BiasedMotionId id) const;
-  /// Likewise.
+  /// The latest value of the measurement.
   const ScalarPrior& prior(ScalarPriorId id) const;
-  /// Likewise.
+  /// The latest value of the measurement.
   const ScalarStep& step(ScalarStepId id) const;
-  /// Likewise.
+  /// The latest value of the measurement.
   const PointObservation& observation(ObservationId id) const;
 
   /// Estimate of a pose.
@@ -134,38 +132,38 @@ class Smoother {
   Eigen::Vector2d point(PointId id) const;
   /// Estimate of a scalar.
   double scalar(ScalarId id) const;
-  /// Squared whitened residual of an observation at the estimates; 0 where it does not count.
+  /// Squared whitened residual of an observation at the estimates; 0 where its information is zero.
   double chi2(ObservationId id) const;
   /// Points that updates moved since the checkpoint, each once.
   const std::vector<PointId>& moved_points() const;
   /// Poses that updates moved since the checkpoint, each once.
   const std::vector<PoseId>& moved_poses() const;
 
-  /// Everything that was given, at the present estimates. O(graph).
+  /// All variables and measurements, at the present estimates. O(graph).
   Graph graph() const;
   /// Adds all of a graph; the smoother must be empty.
   void start_from(const Graph& graph);
 
-  /// Remembers the state as it is.
+  /// Saves the present state for rollback().
   void checkpoint();
   /// Restores the state of the last checkpoint(), exactly.
   void rollback();
 
-  /// The next measurements will be of this pose and of what was observed from it, whatever else is
-  /// changed meanwhile: an update costs less where that is so.
+  /// Announces that the next measurements affect this pose and the points observed from it,
+  /// whatever else changes meanwhile. If so, the next update costs less.
   void expect_changes_at(PoseId id);
-  /// Brings the estimates up to date. Variables without any factor are left alone.
+  /// Updates the estimates. Variables without factors stay.
   SmootherUpdate update();
 
   /// Joint covariance of poses (3 each, right perturbation), then points (2 each); none where a
   /// variable has no factor or is not determined.
   std::optional<Eigen::MatrixXd> joint_marginal(std::span<const PoseId> poses,
                                                 std::span<const PointId> points) const;
-  /// Covariances of poses (right perturbation) and of points, each by itself and in the order
-  /// given; zero where joint_marginal() has none. Costs one elimination of the paths to the root,
-  /// of all variables about one factorisation: for one or two joint_marginal() is cheaper.
+  /// Covariances of poses (right perturbation) and of points, each alone, in the order given; zero
+  /// where joint_marginal() has none. Costs one elimination of the paths to the root, of all
+  /// variables about one factorisation: for one or two joint_marginal() is cheaper.
   Marginals marginals(std::span<const PoseId> poses, std::span<const PointId> points) const;
-  /// Variance of a scalar; none likewise.
+  /// Variance of a scalar; none where it has no factor or is not determined.
   std::optional<double> variance(ScalarId id) const;
 
  private:

@@ -1,4 +1,4 @@
-// Memory for the blocks of numbers that come and go with every update.
+// Memory for short-lived blocks of numbers.
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@
 
 namespace understory::factor_graph::storage {
 
-/// Blocks of T. Small ones are carved from chunks that are kept, by size: once a working set has
-/// been reached, taking and giving back asks the system for nothing. Larger ones come from the
-/// system and go back to it: kept by size they would add up to the most that each size ever needed,
-/// which in space is as much again as what is in use. Blocks hold anything at first.
+/// Blocks of T. Small ones are parts of chunks that are kept, by size: after the working set is
+/// reached, take() and give_back() need no system call. Larger ones are allocated from the system
+/// and returned to it: if kept by size, they would sum up to the maximum of each size, which
+/// doubles the memory for graphs in space. Blocks are not initialised.
 template <typename T>
 class BlockPool {
  public:
@@ -45,7 +45,7 @@ class BlockPool {
  private:
   static constexpr std::size_t kAlignment = 64;
   static constexpr std::size_t kUnit = kAlignment / sizeof(T);
-  static constexpr std::size_t kMostUnits = 16;  ///< Of a small block: one kilobyte.
+  static constexpr std::size_t kMostUnits = 16;  ///< Largest small block: one kilobyte.
   static constexpr std::size_t kChunk = std::size_t{1} << 13U;
   struct Free {
     void operator()(T* chunk) const { ::operator delete (chunk, std::align_val_t{kAlignment}); }

@@ -10,9 +10,9 @@
 
 namespace understory::factor_graph::storage {
 
-/// A table of plain records. A record's first change since the last commit() keeps what it was:
-/// rollback() costs what changed and restores it exactly, with the order in which numbers are given
-/// out. Numbers given back serve again after the next commit().
+/// A table of plain records. The first change of a record since the last commit() saves its old
+/// value: rollback() costs the changes and restores them exactly, including the order of free
+/// numbers. Removed numbers are reused after the next commit().
 template <typename T>
 class JournaledTable {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -34,12 +34,12 @@ class JournaledTable {
     added_.push_back(id);
     return id;
   }
-  /// Its number serves again after the next commit(); until then the record stays.
+  /// Removes a record. Its number is reused after the next commit(); until then the record stays.
   void remove(int id) { removed_.push_back(id); }
 
   /// The record with this number.
   const T& operator[](int id) const { return records_[static_cast<std::size_t>(id)]; }
-  /// The same for change: its first change since the last commit() saves what it was.
+  /// The same for a change: the first one since the last commit() saves the old value.
   T& edit(int id) {
     const auto at = static_cast<std::size_t>(id);
     if (saved_at_[at] != epoch_) {
@@ -49,16 +49,16 @@ class JournaledTable {
     }
     return records_[at];
   }
-  /// The same for what is no part of the state: rollback() may restore it or not.
+  /// The same for fields that are no part of the state: rollback() may restore them or not.
   T& edit_unsaved(int id) { return records_[static_cast<std::size_t>(id)]; }
 
   /// Number of records, with those removed.
   int size() const { return static_cast<int>(records_.size()); }
-  /// Grows with every commit: what carries it was made since the last one.
+  /// Grows with every commit: an object with this epoch was made since the last commit.
   std::uint64_t epoch() const { return epoch_; }
 
-  /// `on_removed(record)` for every record that is now gone for good; `on_saved(before, now)` for
-  /// every one that was changed.
+  /// Calls `on_removed(record)` for every record that is now finally removed, and `on_saved(before,
+  /// now)` for every changed one.
   template <typename OnRemoved, typename OnSaved>
   void commit(OnRemoved&& on_removed, OnSaved&& on_saved) {
     for (std::size_t i = 0; i < saved_.size(); ++i)
@@ -70,8 +70,8 @@ class JournaledTable {
     forget();
   }
 
-  /// `on_undone(id, now, before)` for every changed record, `on_added(id, now)` for every one that
-  /// ceases to be.
+  /// Calls `on_undone(id, now, before)` for every changed record and `on_added(id, now)` for every
+  /// added one, which is removed.
   template <typename OnUndone, typename OnAdded>
   void rollback(OnUndone&& on_undone, OnAdded&& on_added) {
     for (std::size_t i = 0; i < saved_.size(); ++i) {
@@ -103,10 +103,10 @@ class JournaledTable {
   }
 
   BlockList<T> records_;
-  BlockList<std::uint64_t> saved_at_;  ///< Epoch in which each was saved last.
+  BlockList<std::uint64_t> saved_at_;  ///< Epoch of the last save of each record.
   std::vector<int> free_;
-  BlockList<int> saved_ids_;  ///< Of those changed since the last commit ...
-  BlockList<T> saved_;        ///< ... what they were.
+  BlockList<int> saved_ids_;  ///< Numbers of records changed since the last commit ...
+  BlockList<T> saved_;        ///< ... and their old values.
   std::vector<int> added_;
   std::vector<int> removed_;
   std::uint64_t epoch_ = 1;

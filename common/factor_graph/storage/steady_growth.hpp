@@ -6,8 +6,8 @@
 
 namespace understory::factor_graph::storage {
 
-/// Makes room for one more entry: a quarter more, where there is none. A table that has reached its
-/// working set and once needs a little more takes a little more.
+/// Makes room for one more entry; a full table grows by a quarter, so a table that needs slightly
+/// more than before grows only a little.
 template <typename T>
 void make_room(std::vector<T>& table) {
   constexpr std::size_t kFewest = 16;

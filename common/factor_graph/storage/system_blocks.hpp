@@ -1,4 +1,4 @@
-// Blocks of memory straight from the system, which go when their owner does.
+// Blocks of memory from the system, freed with their owner.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,8 @@
 
 namespace understory::factor_graph::storage {
 
-/// Blocks of any size, each as large as it was asked for. A list through the blocks themselves
-/// keeps them: it costs two pointers per block and no search.
+/// Blocks of any size, each of exactly the requested size. They form a linked list: two pointers
+/// per block and no search.
 class SystemBlocks {
  public:
   SystemBlocks() = default;
@@ -40,7 +40,7 @@ class SystemBlocks {
     ::operator delete(link);
   }
 
-  /// Memory of the blocks that are out [bytes].
+  /// Memory of the blocks in use [bytes].
   std::size_t bytes() const { return bytes_; }
 
  private:
