@@ -19,7 +19,7 @@
 namespace understory::foxglove {
 namespace {
 
-/// At most `most` of them, evenly taken.
+/// At most `most` poses, evenly selected.
 std::vector<geometry::SE2> thinned(const std::vector<model::KeyframePose>& keyframes,
                                    std::size_t most) {
   const std::size_t step = keyframes.size() / std::max<std::size_t>(1, most) + 1;
@@ -54,7 +54,7 @@ class Converter::Impl {
   const LandmarkScene& scene() const { return scene_; }
   std::uint64_t refused() const { return refused_; }
 
-  /// Takes bytes; false: they are refused.
+  /// Takes bytes; false = refused.
   using Handler = bool (Impl::*)(std::span<const std::uint8_t>);
   static const std::unordered_map<std::string_view, Handler>& handlers() {
     static const std::unordered_map<std::string_view, Handler> all{
@@ -112,7 +112,7 @@ class Converter::Impl {
   FrameLinks frames_;
   model::SweepAssembler sweeps_;
   model::Utime map_utime_ = 0;   ///< Newest stamp of the landmarks.
-  model::Utime path_utime_ = 0;  ///< Of the last path that was given.
+  model::Utime path_utime_ = 0;  ///< Stamp of the last path.
   std::uint64_t refused_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// How the frames of other processes lie to the map: from poses of the same moment.
+// Poses of other processes' frames in the map, from poses of the same stamp.
 #pragma once
 
 #include <deque>
@@ -13,19 +13,19 @@
 
 namespace understory::foxglove {
 
-/// Frame `parent` to frame `child`, in the plane.
+/// Transform between frames `parent` and `child`, in the plane.
 struct FrameLink {
   std::string_view parent;
   std::string_view child;
   geometry::SE2 parent_T_child;
 };
 
-/// Poses of the last moments by stamp; memory: 64 of them.
+/// The latest 64 poses by stamp.
 class RecentPoses {
  public:
-  /// Takes a pose; older ones than the newest are passed over.
+  /// Takes a pose; poses older than the newest are skipped.
   void add(model::Utime utime, const geometry::SE2& pose);
-  /// The pose of a stamp within 10 ms, the nearest; none where there is none.
+  /// The pose nearest to a stamp, within 10 ms; none where there is none.
   std::optional<geometry::SE2> at(model::Utime utime) const;
 
  private:
@@ -34,22 +34,22 @@ class RecentPoses {
   std::deque<std::pair<model::Utime, geometry::SE2>> poses_;
 };
 
-/// For display alone. `ekf_map` follows the map at every pose that both have; `world`, the frame of
-/// the ground truth, is tied to a map once, at the first localised pose.
+/// For display alone. `ekf_map` is aligned with the map at every common stamp; `world`, the frame
+/// of the ground truth, is aligned with a map once, at the first localised pose.
 class FrameLinks {
  public:
-  /// The filter's pose.
+  /// Takes the filter's pose.
   void take(const model::EkfPose& pose);
-  /// Ground truth: world_T_vehicle.
+  /// Takes ground truth: world_T_vehicle.
   void take_truth(model::Utime utime, const geometry::SE2& world_T_vehicle);
-  /// The mapper's pose; call after what came before it.
+  /// Takes the mapper's pose; call it after all earlier messages.
   void take(const model::SlamPose& pose);
 
-  /// All that is known: vehicle, odom, ekf_map, world, each in map. Empty before the first pose.
+  /// All known links: vehicle, odom, ekf_map, world, each in map. Empty before the first pose.
   std::vector<FrameLink> links() const;
   /// Stamp of the last pose.
   model::Utime utime() const { return pose_ ? pose_->utime : 0; }
-  /// Where the vehicle of the last pose really was, in the map; none where that is not known.
+  /// True pose of the vehicle at the last pose's stamp, in the map; none where it is unknown.
   std::optional<geometry::SE2> true_pose() const;
 
  private:
@@ -60,7 +60,7 @@ class FrameLinks {
   std::optional<geometry::SE2> map_T_world_;
 };
 
-/// Whether the pose in the map means something.
+/// Whether the pose in the map is valid.
 bool is_usable(const model::SlamPose& pose);
 
 }  // namespace understory::foxglove

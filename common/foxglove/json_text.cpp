@@ -93,7 +93,7 @@ void JsonText::whole(std::uint64_t number) {
 }
 
 double rounded(double value) {
-  // Beyond that there is no such digit, and the product might not be finite.
+  // Larger values have no such digit, and the product might not be finite.
   return std::abs(value) < 1e11 ? std::round(value * 1e4) / 1e4 : value;
 }
 

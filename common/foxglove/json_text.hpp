@@ -8,8 +8,8 @@
 
 namespace understory::foxglove {
 
-/// Writes one JSON value from front to back; commas come by themselves. Who calls it sees to it
-/// that what is opened is closed. Text must be UTF-8 (`terminal::printable` makes it so).
+/// Writes one JSON value from front to back; commas are added automatically. The caller must close
+/// every opened object and array. Text must be UTF-8 (`terminal::printable` makes it so).
 class JsonText {
  public:
   /// {
@@ -23,9 +23,9 @@ class JsonText {
   /// The name of the next value.
   void key(std::string_view name);
 
-  /// A number as short as it can be read back; one that is not finite is written as null.
+  /// A number in the shortest form that reads back equal; null if it is not finite.
   void value(double number);
-  /// Whole numbers.
+  /// An integer.
   template <std::integral Integer>
   requires(!std::same_as<Integer, bool>) void value(Integer number) { whole(number); }
   /// true or false.
@@ -39,7 +39,7 @@ class JsonText {
   void value(const char* text) { value(std::string_view(text)); }
   /// Bytes as base64 (RFC 4648, with padding).
   void base64(std::string_view bytes);
-  /// JSON that is whole already.
+  /// Complete JSON, written unchanged.
   void raw(std::string_view json) { put(json); }
 
   /// A name and its value.
@@ -70,7 +70,7 @@ class JsonText {
   bool needs_comma_ = false;
 };
 
-/// `value` at a precision of 0.1 mm, or 1e-4 of any unit: what a display needs, in few bytes.
+/// `value` at a precision of 0.1 mm, or 1e-4 of any unit: sufficient for a display, in few bytes.
 double rounded(double value);
 
 }  // namespace understory::foxglove

@@ -8,10 +8,10 @@ namespace understory::foxglove {
 namespace {
 
 constexpr unsigned kBlockBits = 4;  // 16 landmarks.
-/// A deletion takes what is older than its stamp [us].
+/// A deletion removes entities older than its stamp [us].
 constexpr model::Utime kAfter_us = 1;
 
-/// Of a position, which the wire bounds.
+/// For positions, whose size the wire limits.
 double millimetres(double value) { return std::round(value * 1e3) / 1e3; }
 
 void append_deletion(JsonText& out, model::Utime utime, bool is_all, std::string_view id) {
@@ -22,7 +22,7 @@ void append_deletion(JsonText& out, model::Utime utime, bool is_all, std::string
   out.end_object();
 }
 
-/// Landmarks of a block, as they are drawn.
+/// Landmarks of a block for drawing.
 template <class Block>
 std::vector<DrawnLandmark> drawn(const Block& block) {
   std::vector<DrawnLandmark> result;
@@ -82,7 +82,8 @@ void LandmarkScene::take(const model::Existence& existence) {
     if (submap == submap_of_.end()) continue;
     const BlockId block = block_of(one.id, submap->second);
     Shown& shown = blocks_.at(block).at(one.id);
-    const double probability = std::round(one.probability * 50.0) / 50.0;  // Colours, 2 % apart.
+    const double probability =
+        std::round(one.probability * 50.0) / 50.0;  // Colours in steps of 2 %.
     if (shown.probability == probability && shown.is_in_use == one.is_in_use) continue;
     shown.probability = probability;
     shown.is_in_use = one.is_in_use;

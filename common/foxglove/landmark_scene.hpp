@@ -17,44 +17,43 @@
 
 namespace understory::foxglove {
 
-/// Follows the map as `model::HeldMap` does, and tells which entities differ from what was told
-/// before. Landmarks that were handed over are in the frame of their submap, so a correction moves
-/// one transform and no entity. Positions and radii are those drawn: whole millimetres.
+/// Follows the map like `model::HeldMap`, and returns the entities that changed since the last
+/// update. Landmarks handed over to a submap are in its frame, so a correction changes one
+/// transform and no entity. Positions and radii are rounded to millimetres.
 ///
 /// Memory: about 150 bytes a landmark, of at most `most_landmarks`; further ones are left out and
-/// counted. Each take() costs O(what is in the message * log(map)), MAP O(map), an update
-/// O(changed).
+/// counted. Each take() costs O(size of the message * log(map)), MAP O(map), an update O(changed).
 class LandmarkScene {
  public:
-  /// With a bound for the landmarks that are kept.
+  /// With a limit for the stored landmarks.
   explicit LandmarkScene(std::size_t most_landmarks) : most_(most_landmarks) {}
 
-  /// The whole map; one that is cut to bounds is passed over.
+  /// Takes the whole map; a map cut to bounds is skipped.
   void take(const model::WholeMap& map);
-  /// What changed; an older one is passed over.
+  /// Takes a change; an older one is skipped.
   void take(const model::MapDelta& delta);
-  /// The update that starts a map ends the one before.
+  /// Takes an update; one that starts a map ends the previous map.
   void take(const model::MapUpdate& update);
-  /// What the mapper handed over.
+  /// Takes a submap handed over by the mapper.
   void take(const model::Submap& submap);
-  /// Probabilities of landmarks that are there; others are passed over.
+  /// Takes probabilities of known landmarks; others are skipped.
   void take(const model::Existence& existence);
 
-  /// Whether update() has something to tell.
+  /// Whether update() would contain changes.
   bool has_changed() const { return was_cleared_ || !changed_.empty(); }
   /// A SceneUpdate with the entities that changed since the last call.
   std::string update(model::Utime utime);
-  /// The same as if it had been written, and thrown away.
+  /// Like update() with the result discarded, at less cost.
   void skip_update();
-  /// A SceneUpdate that deletes everything and has all entities.
+  /// A SceneUpdate that deletes everything and contains all entities.
   std::string whole(model::Utime utime) const;
   /// Landmarks in the scene.
   std::size_t size() const { return submap_of_.size(); }
-  /// Landmarks that were left out since the map started.
+  /// Landmarks left out since the start of the map.
   std::uint64_t left_out() const { return left_out_; }
 
  private:
-  /// One landmark, rounded as it is drawn.
+  /// One landmark, rounded for drawing.
   struct Shown {
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
     double radius_m = 0.0;
@@ -62,7 +61,7 @@ class LandmarkScene {
     double probability = std::numeric_limits<double>::quiet_NaN();
     bool is_in_use = true;
   };
-  /// An entity: landmarks of one submap (0 = held by the mapper) with neighbouring ids.
+  /// An entity: landmarks of one submap (0 = in the mapper's memory) with neighbouring ids.
   struct BlockId {
     std::uint64_t submap = 0;
     std::uint64_t number = 0;
@@ -83,8 +82,8 @@ class LandmarkScene {
   std::size_t most_;
   std::map<BlockId, Block> blocks_;  ///< None of them empty.
   std::unordered_map<model::LandmarkId, std::uint64_t> submap_of_;
-  std::set<BlockId> changed_;  ///< Also those that are gone.
-  bool was_cleared_ = true;    ///< Since the last update: what a client had is worth nothing.
+  std::set<BlockId> changed_;  ///< Removed ones included.
+  bool was_cleared_ = true;  ///< Cleared since the last update: the client's entities are invalid.
   std::uint64_t version_ = 0;
   std::uint64_t left_out_ = 0;
 };

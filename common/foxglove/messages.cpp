@@ -54,7 +54,7 @@ void append_float(std::string& out, float value) {
   out.append(bytes.data(), bytes.size());
 }
 
-/// Every `step`-th point.
+/// Packs every `step`-th point.
 std::string packed_points(const std::vector<model::SweepPoint>& points, std::size_t step) {
   std::string bytes;
   bytes.reserve(kPointBytes * (points.size() / step + 1));
@@ -207,7 +207,7 @@ std::string location_fix(const gnss_t& fix) {
   out.field("altitude", fix.altitude_m);
   out.key("position_covariance");
   out.begin_array();
-  // Of the height nothing is stated.
+  // The height has no stated covariance.
   for (int i = 0; i < 9; ++i) out.value(i == 0 || i == 4 ? variance : 0.0);
   out.end_array();
   out.field("position_covariance_type", fix.sigma_m > 0.0 ? 1 : 0);

@@ -13,7 +13,7 @@
 namespace understory::foxglove {
 namespace {
 
-/// Where the fields of a message go: each is named once, for the message and for its schema.
+/// Output of a message's fields; each field is named once, for the message and for its schema.
 class FieldSink {
  public:
   FieldSink() = default;
@@ -21,7 +21,7 @@ class FieldSink {
   FieldSink& operator=(const FieldSink&) = delete;
   virtual ~FieldSink() = default;
   virtual void time(model::Utime utime) = 0;
-  virtual void number(std::string_view name, double value) = 0;  ///< Left out where not known.
+  virtual void number(std::string_view name, double value) = 0;  ///< Left out where unknown.
   virtual void count(std::string_view name, std::int64_t value) = 0;
   virtual void flag(std::string_view name, bool value) = 0;
   virtual void text(std::string_view name, std::string_view value) = 0;
@@ -80,7 +80,7 @@ double largest_sigma(const Eigen::Matrix3d& covariance) {
   return root(solver.eigenvalues().maxCoeff());
 }
 
-/// Of a pose: x and y of the vehicle, the largest, the heading.
+/// Sigmas of a pose: x and y of the vehicle, the largest, the heading.
 void append_sigmas(FieldSink& to, const Eigen::Matrix3d& covariance) {
   to.number("sigma_x_m", root(covariance(0, 0)));
   to.number("sigma_y_m", root(covariance(1, 1)));
@@ -165,7 +165,7 @@ std::string_view health_text(int state) {
   return is_known ? kTexts[static_cast<std::size_t>(state)] : "unknown";
 }
 
-/// What all channels of a process say together.
+/// Sums over all channels of a process.
 void append_channels(FieldSink& to, const std::vector<channel_health_t>& channels) {
   channel_health_t sum{};
   double in_hz = 0.0;

@@ -1,4 +1,4 @@
-// Figures that are worth a plot, as small flat messages of our own schemas (understory.NAME).
+// Values for plots, as small flat messages of our own schemas (understory.NAME).
 #pragma once
 
 #include <limits>
@@ -15,35 +15,36 @@
 
 namespace understory::foxglove {
 
-/// Of a SLAM_POSE. Not a number = not known; it is left out.
+/// Values of a SLAM_POSE. NaN = unknown; the field is left out.
 struct PoseNumbers {
   model::SlamPose pose;
-  /// From the stamp of the observation to the receipt of its pose [s]; means something live only.
+  /// Time from the stamp of the observation to the reception of its pose [s]; valid only live.
   double latency_s = std::numeric_limits<double>::quiet_NaN();
-  /// Against GROUND_TRUTH, whose frame is tied to the map at the first common stamp.
+  /// Error of the position against GROUND_TRUTH, whose frame is aligned with the map at the first
+  /// common stamp.
   double error_m = std::numeric_limits<double>::quiet_NaN();
-  double error_deg = std::numeric_limits<double>::quiet_NaN();  ///< Likewise, of the heading.
+  double error_deg = std::numeric_limits<double>::quiet_NaN();  ///< The same for the heading.
 };
 
-/// One of LOOP_CLOSURE (without a result) or LOOP_RESULT.
+/// Values of LOOP_CLOSURE (without a result) or LOOP_RESULT.
 struct LoopNumbers {
   model::Utime utime = 0;
   std::uint64_t closure_id = 0;
-  std::string source;  ///< Who says so; empty of a result.
+  std::string source;  ///< Source of the closure; empty for a result.
   std::string status;  ///< sent, revoked, accepted, waiting or refused.
   std::string reason;
 };
 
-/// Named status of a pose, as `services/viewer/protocol.md` lists them.
+/// Name of a pose's status, as in `services/viewer/protocol.md`.
 std::string_view status_text(const model::SlamPose& pose);
 
 /// The messages as JSON; every one has a `timestamp`.
 std::string to_json(const PoseNumbers& numbers);
-/// NIS of the accepted pose, with its degrees of freedom, and what the search did.
+/// NIS of the accepted pose with its degrees of freedom, and values of the search.
 std::string to_json(const model::MapUpdate& update);
 /// Sigmas, speed and biases of the filter.
 std::string to_json(const model::EkfPose& pose);
-/// Shares and counts of landmarks that are taken for gone.
+/// Shares and counts of landmarks judged as removed.
 std::string to_json(const model::Existence& existence);
 /// Latencies, memory and losses of one process.
 std::string to_json(const health_t& health);

@@ -1,4 +1,4 @@
-// What a converter gives out: the messages in hand, and the latest of topics with state.
+// Output of a converter: the present messages, and the latest of topics with state.
 #pragma once
 
 #include <array>
@@ -26,15 +26,15 @@ class Outbox {
     messages_.push_back(made(id, utime, std::move(json)));
     if (keeps(id)) latest_[static_cast<std::size_t>(id)] = messages_.back();
   }
-  /// A message that is given to nobody yet.
+  /// Makes a message without putting it out.
   Converted made(TopicId id, model::Utime utime, std::string json) const {
     return {id, nanoseconds(received_utime_), nanoseconds(utime),
             std::make_shared<const std::string>(std::move(json))};
   }
-  /// All that was given since begin(), in order of topic.
+  /// All messages since begin(), in order of topic.
   std::vector<Converted> take();
 
-  /// The latest message of a topic with state; none of landmarks, which are a sequence.
+  /// The latest message of a topic with state; none for landmarks, whose messages are increments.
   const std::optional<Converted>& latest(TopicId id) const {
     return latest_[static_cast<std::size_t>(id)];
   }

@@ -13,7 +13,7 @@ constexpr double kHeight_m = 2.0;
 constexpr double kUnknownRadius_m = 0.15;
 
 double hundredths(double value) { return std::round(value * 1e2) / 1e2; }
-/// Of a unit quaternion: 1e-6 is 2e-6 rad.
+/// For unit quaternions: 1e-6 is 2e-6 rad.
 double millionths(double value) { return std::round(value * 1e6) / 1e6; }
 
 }  // namespace

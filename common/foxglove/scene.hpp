@@ -1,4 +1,4 @@
-// Parts of messages that many schemas share, written to JSON.
+// JSON of message parts that several schemas share.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@ inline constexpr std::string_view kVehicleFrame = "vehicle";
 /// Frame of a submap that was handed over.
 std::string submap_frame(std::uint64_t submap_id);
 
-/// `utime` [us] as nanoseconds since the epoch; what lies before it is 0.
+/// `utime` [us] as nanoseconds since the epoch; earlier times become 0.
 std::uint64_t nanoseconds(model::Utime utime);
 /// Field `name`: {sec, nsec}.
 void time_field(JsonText& out, std::string_view name, model::Utime utime);
@@ -29,10 +29,10 @@ void vector_field(JsonText& out, std::string_view name, const Eigen::Vector3d& v
 void quaternion_field(JsonText& out, std::string_view name, const Eigen::Quaterniond& value);
 /// A pose in the plane, as a value.
 void pose_value(JsonText& out, const geometry::SE2& pose);
-/// Field `pose`: a point without a turn.
+/// Field `pose`: a position with zero rotation.
 void place_field(JsonText& out, const Eigen::Vector3d& position);
 
-/// 0 to 1 each.
+/// Colour; each component 0 to 1.
 struct Color {
   double red = 0.0;
   double green = 0.0;
@@ -41,7 +41,7 @@ struct Color {
 };
 /// Field `color`.
 void color_field(JsonText& out, const Color& color);
-/// Red (gone) over yellow to green (there); grey where not known; faint where not in use.
+/// Red (removed) over yellow to green (existing); grey = unknown; faint = not in use.
 Color existence_color(double probability, bool is_in_use);
 
 /// One landmark as it is drawn: a trunk as a cylinder, a corner as a slender box.
@@ -63,13 +63,13 @@ template <class Range>
 std::string scene_of(model::Utime utime, std::string_view frame, std::string_view id,
                      const Range& landmarks);
 
-/// What the templates above are made of.
+/// Parts of the templates above.
 namespace internal {
 /// Everything of an entity before its landmarks.
 void begin_entity(JsonText& out, model::Utime utime, std::string_view frame, std::string_view id);
 /// A primitive of `cylinders` or `cubes`.
 void landmark_value(JsonText& out, const DrawnLandmark& landmark);
-/// Those kinds of primitives that are never drawn.
+/// Empty lists of the unused kinds of primitives.
 void end_entity(JsonText& out);
 }  // namespace internal
 

@@ -1,4 +1,4 @@
-// JSON Schemas of the well-known messages that are used, and how one is put together.
+// JSON Schemas of the well-known messages in use, and functions to build one.
 #pragma once
 
 #include <map>
@@ -20,7 +20,7 @@ std::string object_schema(std::string_view title, const std::vector<Property>& p
 /// {sec, nsec} since the epoch.
 std::string time_schema();
 
-/// By name (foxglove.Log): those of `@foxglove/schemas` 2.1.0, without their descriptions. A test
+/// Schemas by name (foxglove.Log), from `@foxglove/schemas` 2.1.0 without descriptions. A test
 /// compares them.
 std::map<std::string_view, std::string> well_known_schemas();
 

@@ -95,12 +95,12 @@ std::optional<std::uint32_t> number_in(const Json& object, const char* name) {
 
 }  // namespace
 
-/// What a client asks for, checked for its form.
+/// A client's request with checked syntax.
 struct Session::Request {
   enum class Kind : std::uint8_t { kSubscribe, kUnsubscribe, kOther, kMalformed };
   Kind kind = Kind::kMalformed;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> subscriptions;  ///< (id, channel id).
-  std::vector<std::uint32_t> ids;                                      ///< To be ended.
+  std::vector<std::uint32_t> ids;                                      ///< Subscriptions to end.
 
   static Request parse(std::string_view text);
 

@@ -1,8 +1,8 @@
 // One client of the Foxglove WebSocket protocol, without the socket.
 //
 // The protocol is the one of github.com/foxglove/ws-protocol (docs/spec.md); subprotocols
-// foxglove.websocket.v1 and foxglove.sdk.v1 have the same messages. A session reads what the client
-// sent and says what to send next; whoever owns the socket carries both:
+// foxglove.websocket.v1 and foxglove.sdk.v1 have the same messages. A session takes the client's
+// messages and returns the messages to send; the owner of the socket transports both:
 //
 //   session.take_text(text) or session.take_binary(bytes)  for what comes in,
 //   session.offer(converted)                               for every message of a Converter,
@@ -25,7 +25,7 @@
 
 namespace understory::foxglove {
 
-/// Names of the protocol in Sec-WebSocket-Protocol; a client that offers none of them is refused.
+/// Names of the protocol in Sec-WebSocket-Protocol; a client without any of them is refused.
 inline constexpr std::array<std::string_view, 2> kSubprotocols{"foxglove.sdk.v1",
                                                                "foxglove.websocket.v1"};
 
@@ -35,7 +35,7 @@ struct Outgoing {
   std::string bytes;
 };
 
-/// What a session says of its server, and its bounds.
+/// Server information and limits of a session.
 struct SessionOptions {
   std::string name = "understory";
   std::string session_id = {};               ///< Tells runs of the server apart; empty = none.
@@ -45,33 +45,34 @@ struct SessionOptions {
   std::uint64_t most_refused = 100;          ///< Then the client should go.
 };
 
-/// What became of a client's message.
+/// Result of a client's message.
 enum class Taken : std::uint8_t {
   kDone,
-  kNotSupported,  ///< Of the protocol, but not offered here; the client gets a status.
-  kMalformed,     ///< Not of the protocol, or against its rules; likewise.
+  kNotSupported,  ///< Part of the protocol, but not offered; the client gets a status message.
+  kMalformed,     ///< Not part of the protocol, or against its rules; likewise.
 };
 
-/// What a session counted.
+/// Counts of a session.
 struct SessionCounts {
-  std::uint64_t sent = 0;     ///< Messages of topics that next() gave.
-  std::uint64_t dropped = 0;  ///< Messages of topics that the client was too slow for.
-  std::uint64_t resent = 0;   ///< How often the whole was asked for after a loss.
+  std::uint64_t sent = 0;     ///< Messages of topics returned by next().
+  std::uint64_t dropped = 0;  ///< Messages of topics dropped because the client was too slow.
+  std::uint64_t resent = 0;   ///< Number of requests for the whole state after a loss.
   std::uint64_t malformed = 0;
   std::uint64_t not_supported = 0;
 };
 
-/// Bounded memory: of each topic what `SessionOptions` allows. Nothing that a client sends throws.
+/// Bounded memory: for each topic as in `SessionOptions`. No message of a client causes an
+/// exception.
 class Session {
  public:
-  /// With serverInfo and the list of all topics ready to be sent.
+  /// A session whose first messages are serverInfo and the list of all topics.
   explicit Session(SessionOptions options = {});
 
   /// Takes a text message of the client.
   Taken take_text(std::string_view text);
-  /// Takes a binary message of the client: it may publish nothing, so it is refused.
+  /// Takes a binary message of the client: always refused, because clients may not publish.
   Taken take_binary(std::span<const std::uint8_t> bytes);
-  /// Queues a message where the client subscribed to its topic; O(1) but for dropping.
+  /// Queues a message if the client subscribed its topic; O(1) except for dropping.
   void offer(const Converted& message);
   /// The next message to send: replies first, then topics in the order in which they came.
   std::optional<Outgoing> next();
@@ -80,17 +81,17 @@ class Session {
   std::vector<TopicId> take_wanted();
   /// Whether the client wants messages of the topic.
   bool is_subscribed(TopicId id) const { return line(id).subscription.has_value(); }
-  /// Whether it sent so much that is refused that the connection should be closed.
+  /// Whether so many of its messages were refused that the connection should be closed.
   bool should_close() const;
   /// Bytes of messages that wait.
   std::size_t waiting_bytes() const;
-  /// So far.
+  /// Counts so far.
   const SessionCounts& counts() const { return counts_; }
 
  private:
-  /// One topic, for this client.
+  /// The state of one topic for this client.
   struct Line {
-    std::optional<std::uint32_t> subscription;  ///< The client's id.
+    std::optional<std::uint32_t> subscription;  ///< The client's subscription id.
     WaitingLine waiting;
   };
   struct Request;
@@ -111,7 +112,7 @@ class Session {
   SessionCounts counts_;
 };
 
-/// Offers the state of the topics that the client needs it of.
+/// Offers the state of the topics for which the client needs it.
 void bring_up_to_date(Session& session, const Converter& converter);
 
 }  // namespace understory::foxglove

@@ -1,4 +1,4 @@
-// Messages of the bus that stand for themselves: nothing is kept of them.
+// Messages of the bus that are converted without stored state.
 #pragma once
 
 #include "common/foxglove/outbox.hpp"
@@ -14,7 +14,8 @@
 
 namespace understory::foxglove {
 
-/// Each gives what a message says and returns whether it is fit to be shown; else nothing is given.
+/// Each function puts out the converted message; false = not fit for display, and nothing is put
+/// out.
 bool give_message(Outbox& out, const model::MapCorrection& correction);
 /// LANDMARKS.
 bool give_message(Outbox& out, const model::LandmarkScan& scan);
@@ -24,7 +25,7 @@ bool give_message(Outbox& out, const lidar_scan_t& scan);
 bool give_message(Outbox& out, const model::RawPose& pose);
 /// TRUTH_LANDMARKS.
 bool give_message(Outbox& out, const truth_landmarks_t& truth);
-/// GNSS; a receiver without a fix says nothing, which is no fault.
+/// GNSS; without a fix there is no output, which is no fault.
 bool give_message(Outbox& out, const gnss_t& fix);
 /// LOG.
 bool give_message(Outbox& out, const log_t& line);

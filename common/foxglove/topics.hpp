@@ -1,4 +1,4 @@
-// What is offered: the topics, their schemas, and how they may be dropped.
+// The offered topics, their schemas, and their rules for dropping.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace understory::foxglove {
 
-/// The topics, in the order in which they are listed.
+/// The topics, in the order of the list.
 enum class TopicId : std::uint8_t {
   kTransforms,
   kSubmapTransforms,
@@ -39,11 +39,11 @@ enum class TopicId : std::uint8_t {
 /// Number of topics.
 inline constexpr std::size_t kTopics = 24;
 
-/// What a client that is too slow may miss.
+/// Messages that a slow client may lose.
 enum class Delivery : std::uint8_t {
   kLatest,     ///< Everything but the newest message.
   kEach,       ///< The oldest of many messages.
-  kIncrement,  ///< Nothing: a message builds on those before it; after a loss the whole is sent.
+  kIncrement,  ///< None: a message depends on earlier ones; after a loss the whole state is sent.
 };
 
 /// One topic; messages are JSON.
@@ -52,15 +52,14 @@ struct Topic {
   std::string_view name;         ///< For example /pose.
   std::string_view schema_name;  ///< foxglove.NAME as in `@foxglove/schemas`, or understory.NAME.
   Delivery delivery = Delivery::kLatest;
-  bool has_state =
-      false;  ///< A client that comes later needs the latest one (Converter::state_of).
+  bool has_state = false;  ///< A later client needs the latest message (Converter::state_of).
 };
 
 /// All topics; entry i has TopicId i.
 std::span<const Topic> topics();
 /// The topic of an id.
 const Topic& topic(TopicId id);
-/// Its schema (JSON Schema, encoding `jsonschema`); made once.
+/// The topic's schema (JSON Schema, encoding `jsonschema`); made once.
 const std::string& schema_of(TopicId id);
 
 }  // namespace understory::foxglove

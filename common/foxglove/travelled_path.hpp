@@ -1,4 +1,4 @@
-// The path so far, in a bounded number of poses.
+// The path so far, as a bounded number of poses.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,16 @@
 
 namespace understory::foxglove {
 
-/// Poses at least 0.5 m apart; when there are too many, every other one goes and the distance
-/// doubles. So it covers the whole drive, with less detail on a longer one.
+/// Poses at least 0.5 m apart; when there are too many, every second one is removed and the
+/// distance doubles. The path always covers the whole drive, with less detail on a longer one.
 class TravelledPath {
  public:
-  /// Of at most `most_poses` (2 or more).
+  /// A path of at most `most_poses` (2 or more).
   explicit TravelledPath(std::size_t most_poses) : most_(most_poses) {}
 
-  /// Takes a pose that means something; another map starts another path. True where the path, as
-  /// poses() gives it, has changed.
+  /// Takes a valid pose; another map starts another path. True where poses() has changed.
   bool add(const model::SlamPose& pose);
-  /// In order of time, frame map.
+  /// Poses in order of time, frame map.
   const std::vector<geometry::SE2>& poses() const { return poses_; }
 
  private:

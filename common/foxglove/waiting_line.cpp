@@ -10,14 +10,15 @@ std::uint64_t WaitingLine::offer(const Converted& message, std::uint64_t turn,
   std::uint64_t dropped = 0;
   switch (topic(message.topic).delivery) {
     case Delivery::kLatest:
-      if (!queue_.empty()) turn = queue_.front().turn;  // It waited for that long.
+      if (!queue_.empty())
+        turn = queue_.front().turn;  // It keeps the place of the replaced message.
       dropped = clear();
       break;
     case Delivery::kEach:
       dropped = make_room(bytes, bounds);
       break;
     case Delivery::kIncrement:
-      // The whole, which comes later, has it in it.
+      // The whole state, which follows, includes it.
       if (needs_state_) return 0;
       if (!is_full_for(bytes, bounds)) break;
       needs_state_ = true;

@@ -1,4 +1,4 @@
-// The messages of one topic that wait for one client.
+// Waiting messages of one topic for one client.
 #pragma once
 
 #include <cstdint>
@@ -9,34 +9,35 @@
 
 namespace understory::foxglove {
 
-/// How much may wait. One message always may, however large it is.
+/// Limits of waiting messages. One message of any size may always wait.
 struct LineBounds {
   std::size_t messages = 0;
   std::size_t bytes = 0;
 };
 
-/// First in, first out, and dropped as `Delivery` says.
+/// First in, first out; drops by `Delivery`.
 class WaitingLine {
  public:
-  /// Of a topic that nobody subscribed to: nothing waits.
+  /// The queue of a topic without subscription: always empty.
   WaitingLine() = default;
-  /// Of a topic that a client wants; `needs_state`: it needs the state first.
+  /// The queue of a subscribed topic; `needs_state`: it needs the state first.
   explicit WaitingLine(bool needs_state) : needs_state_(needs_state) {}
 
-  /// Puts a message in; `turn` counts arrivals of all topics. Gives the number of messages that
-  /// were dropped for it, itself included.
+  /// Adds a message; `turn` counts arrivals of all topics. Returns the number of messages dropped
+  /// for it, itself included.
   std::uint64_t offer(const Converted& message, std::uint64_t turn, const LineBounds& bounds);
-  /// Arrival of the first message; none: nothing waits. One that replaced another has its turn.
+  /// Arrival number of the first message; none = no message waits. A replacing message keeps the
+  /// number of the replaced one.
   std::optional<std::uint64_t> turn() const;
-  /// Takes out the first message. Precondition: there is one.
+  /// Takes out the first message. Precondition: a message waits.
   Converted pop();
-  /// Of all that wait.
+  /// Bytes of all waiting messages.
   std::size_t bytes() const { return bytes_; }
 
-  /// Whether the state is needed now. After a loss that is only once the client has caught up
-  /// (`is_slow` is false): else one loss would follow another.
+  /// Whether the state is needed now. After a loss, only when the client has caught up (`is_slow`
+  /// is false), otherwise another loss would follow.
   bool wants_state(bool is_slow) const { return needs_state_ && !(is_after_loss_ && is_slow); }
-  /// The state comes next. Gives whether that is because of a loss.
+  /// The next message is the state. Returns whether a loss is the reason.
   bool expect_state();
 
  private:
