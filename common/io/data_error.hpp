@@ -1,15 +1,15 @@
-// The one exception of the readers of recorded data.
+// The exception of all readers of recorded data.
 #pragma once
 
 #include <stdexcept>
 
 namespace understory::io {
 
-/// Recorded data that cannot be read or is not what it should be; what() names the file, where in
-/// it, and what was expected.
+/// Recorded data is unreadable or invalid; what() states the file, the place in it and the expected
+/// content.
 class DataError : public std::runtime_error {
  public:
-  /// From the one-line message that what() gives.
+  /// Takes the one-line message for what().
   using std::runtime_error::runtime_error;
 };
 

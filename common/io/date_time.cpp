@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kBlank = " \t\r\n";
 
-/// Takes a line from its front; what is not there makes the whole line none.
+/// Reads a line from its begin; a missing part makes the result none.
 class DateReader {
  public:
   explicit DateReader(std::string_view line) : rest_(line) {}
@@ -38,7 +38,7 @@ class DateReader {
     return true;
   }
   void want(std::string_view any) { is_good_ = pass(any) && is_good_; }
-  /// Microseconds of a fraction.
+  /// Reads a fraction as microseconds.
   int micros() {
     if (!pass(".,")) return 0;
     constexpr std::string_view kDigits = "0123456789";
@@ -50,7 +50,7 @@ class DateReader {
     std::from_chars(fraction.data(), fraction.data() + fraction.size(), value);
     return value;
   }
-  /// Seconds that the time is ahead of UTC.
+  /// Reads the offset from UTC [s].
   int offset_s() {
     if (pass("Zz") || is_at_end()) return 0;
     const int sign = pass("-") ? -1 : 1;

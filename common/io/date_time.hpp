@@ -11,10 +11,10 @@ namespace understory::io {
 /// Whether the text begins with a date ("2011-09-26") and not with a number.
 bool begins_with_date(std::string_view text);
 
-/// One date and time a line: "2011-09-26 13:02:44.335092332", "2011-09-26T15:02:44,3+02:00". Blank
-/// or T between them, seconds with any digits (those behind the microsecond are cut off), Z or an
-/// offset behind; without one it is UTC. Empty lines are passed over. Throws DataError with
-/// `source` and line.
+/// Reads one date and time per line: "2011-09-26 13:02:44.335092332",
+/// "2011-09-26T15:02:44,3+02:00". A blank or T separates them; seconds may have any number of
+/// digits (digits after the microsecond are cut off); Z or an offset follows, otherwise it is UTC.
+/// Empty lines are skipped. Throws DataError with `source` and line.
 std::vector<model::Utime> parse_date_times(std::string_view text, std::string_view source);
 
 }  // namespace understory::io

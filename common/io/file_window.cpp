@@ -15,7 +15,7 @@ namespace understory::io {
 
 FileWindow::FileWindow(const std::filesystem::path& path) : path_(path), window_(kWindowBytes) {
   struct stat status {};
-  // Looked at before it is opened: opening a pipe would wait for its writer.
+  // Checked before opening, because opening a pipe would wait for its writer.
   if (::stat(path.c_str(), &status) != 0) {
     throw LogError(fmt::format("{}: {}", path.string(), std::strerror(errno)));
   }

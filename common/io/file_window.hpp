@@ -8,7 +8,7 @@
 
 namespace understory::io {
 
-/// The file keeps the size it had when it was opened; one that shrinks meanwhile reads short.
+/// The size is fixed at opening; reads of a file that shrinks are short.
 class FileWindow {
  public:
   /// Throws LogError when the file cannot be opened or is not a regular file.
@@ -22,12 +22,12 @@ class FileWindow {
   /// Up to `count` bytes (at most kWindowBytes) from `offset`; fewer at the end of the file. Valid
   /// until the next call.
   std::span<const std::uint8_t> peek(std::uint64_t offset, std::size_t count);
-  /// Fills `out` from `offset`; false when the file ends before. Leaves the buffer where it is, so
-  /// that looking ahead costs no more than what it reads.
+  /// Fills `out` from `offset`; false when the file is shorter. The buffer stays unchanged, so that
+  /// reading ahead costs only the bytes read.
   bool read(std::uint64_t offset, std::span<std::uint8_t> out);
 
-  /// Where the file's next data is, at or behind `offset`: a hole in between takes no room on the
-  /// device. The size of the file when there is none; `offset` where the file system does not tell.
+  /// Offset of the next data at or after `offset`; holes use no room on the device. The size of the
+  /// file where there is none; `offset` where the file system does not report holes.
   std::uint64_t data_from(std::uint64_t offset) const;
 
   static constexpr std::size_t kWindowBytes = 256 * 1024;

@@ -6,7 +6,7 @@
 namespace understory::io {
 namespace {
 
-/// Identifications come again after 65,536 datagrams: 50 s of a laser that sends 1,280 a second.
+/// Identifications repeat after 65,536 datagrams: 50 s of a laser that sends 1,280 per second.
 constexpr model::Utime kLongestWait_us = 2'000'000;
 constexpr std::size_t kMostPending = 64;
 constexpr std::size_t kLargestDatagram = 65'535;

@@ -39,7 +39,7 @@ model::PointSweep parse_points(std::string_view bytes, double revolution_s,
     std::memcpy(&reflectances[i], bytes.data() + kPointBytes * i + 3 * sizeof(float),
                 sizeof(float));
   }
-  // From ahead to the left, the highest beam first.
+  // Beams start ahead and turn left, the highest first.
   const RingTurns beams = find_turns(positions, 0.0);
   if (beams.turn.size() != positions.size())
     throw DataError(fmt::format("{}: its points are not ring after ring", source));
@@ -57,7 +57,7 @@ model::PointSweep parse_points(std::string_view bytes, double revolution_s,
     point.ring = static_cast<std::uint16_t>(
         std::max(0, kitti::kRings - 1 - static_cast<int>(beams.turn[i])));
 
-    // From behind the car, clockwise.
+    // Azimuth from behind the car, clockwise.
     const float azimuth = std::atan2(point.y_m, point.x_m);
     point.time_s =
         static_cast<float>(revolution_s) * 0.5F * (1.0F - azimuth / std::numbers::pi_v<float>);
@@ -119,7 +119,8 @@ std::vector<model::Utime> stamps_of(const RecordingFolder& folder, std::string_v
   return parse_date_times(folder.read(name), folder.describe(name));
 }
 
-/// The stamp of each file: its name is the line's number. Drives may be cut, their stamps whole.
+/// The stamp of each file, whose name is the line's number. Drives may lack files and still have
+/// all stamps.
 std::vector<model::Utime> pick_stamps(const std::vector<fs::path>& files,
                                       const std::vector<model::Utime>& stamps,
                                       const fs::path& folder) {

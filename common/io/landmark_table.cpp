@@ -18,7 +18,7 @@
 namespace understory::io {
 namespace {
 
-/// UTM northings end at 1e7 m, and no survey reaches farther: what lies beyond is a damaged number.
+/// UTM northings end at 1e7 m; a larger coordinate is a damaged number.
 constexpr double kFarthestCoordinateM = 1e8;
 constexpr double kWidestSurveyM = 2e5;
 constexpr double kThickestTrunkM = 20.0;

@@ -14,39 +14,39 @@ namespace understory::io {
 /// A landmark of a table.
 struct LandmarkRow {
   model::MapLandmark landmark;  ///< Without id; frame of the survey, in metres or in degrees.
-  std::uint64_t line = 0;       ///< Where it stands, from 1.
+  std::uint64_t line = 0;       ///< Line of the row, from 1.
 };
 
-/// Two landmarks that stand close together.
+/// Two landmarks close together.
 struct ClosePair {
-  std::size_t first = 0;  ///< Index; the lesser one.
+  std::size_t first = 0;  ///< The smaller index.
   std::size_t second = 0;
   double distance_m = 0.0;
 };
 
-/// How a table is read.
+/// Options of reading a table.
 struct LandmarkTableOptions {
-  double sigma_m = 0.1;              ///< Of a row without one, in x and in y [m].
-  std::vector<NamedColumn> columns;  ///< Columns that a person named.
+  double sigma_m = 0.1;  ///< Standard deviation of a row without one, in x and in y [m].
+  std::vector<NamedColumn> columns;  ///< Columns named by the user.
   CoordinateUnit
-      unit{};  ///< Of coordinates. Degrees are kept in `position_m`: longitude, latitude.
+      unit{};  ///< Unit of coordinates. Degrees are stored in `position_m`: longitude, latitude.
 };
 
-/// What a table has.
+/// Content of a table.
 struct LandmarkRows {
   std::vector<LandmarkRow> rows;
   std::vector<std::string> passed_over;  ///< Headings of columns that were not read.
   std::vector<std::string> remarks;      ///< Diameters below 1 cm or above 4 m, a line each.
 };
 
-/// Rows of the columns x_m, y_m and, where they are there, sigma_m (standard deviation in x and in
-/// y, without correlation), dbh_m (diameter at breast height) and kind (trunk or corner), in any
-/// order and under the headings and units of table_headings.hpp; other columns are passed over and
-/// told. The text is a table of text_table.hpp. An empty cell is `sigma_m`, no diameter, a trunk.
-/// Throws DataError with `source` and line for headings that are not
-/// recognised, a row of another number of cells, what is no finite number, coordinates beyond 1e8 m
-/// or farther than 200 km from the first row's, a sigma that is not within 0 (exclusive) and 1 km,
-/// a diameter that is not within 0 and 20 m, an unknown kind, and where there is no row.
+/// Reads the columns x_m, y_m and, if present, sigma_m (standard deviation in x and in y, without
+/// correlation), dbh_m (diameter at breast height) and kind (trunk or corner), in any order and
+/// under the headings and units of table_headings.hpp; other columns are skipped and listed. The
+/// text is a table of text_table.hpp. An empty cell means `sigma_m`, no diameter, a trunk. Throws
+/// DataError with `source` and line for headings that are not recognised, a row with another number
+/// of cells, values that are not finite numbers, coordinates beyond 1e8 m or farther than 200 km
+/// from the first row's, a sigma outside 0 (exclusive) to 1 km, a diameter outside 0 to 20 m, an
+/// unknown kind, and a table without rows.
 LandmarkRows parse_landmark_table(std::string_view text, std::string_view source,
                                   const LandmarkTableOptions& options);
 

@@ -12,7 +12,7 @@
 namespace understory::io {
 namespace {
 
-/// Where the magic number is in these bytes. Garbage is searched as fast as memory is read.
+/// Offset of the magic number in these bytes. The search has the speed of reading memory.
 std::optional<std::size_t> magic_in(std::span<const std::uint8_t> bytes) {
   const std::uint8_t* at = bytes.data();
   const std::uint8_t* const end = at + bytes.size();
@@ -55,7 +55,7 @@ class LcmLogReader::Impl {
   std::uint64_t size() const { return file_.size(); }
 
  private:
-  /// The header of an event that fits into the file and whose channel is a name.
+  /// The header of an event that fits into the file and has a valid channel name.
   std::optional<Header> header_at(std::uint64_t offset) {
     const auto bytes = file_.peek(offset, kHeaderBytes + kMaxChannelBytes);
     if (bytes.size() < kHeaderBytes) return std::nullopt;
@@ -68,8 +68,7 @@ class LcmLogReader::Impl {
     return header;
   }
 
-  /// Whether there is the magic number, or as much of it as a file that was cut there (or ends
-  /// there) still holds.
+  /// Whether the magic number is here, or its first bytes at the end of a cut file.
   bool begins_like_event(std::uint64_t offset) {
     std::array<std::uint8_t, 4> bytes{};
     const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(4, file_.size() - offset));
@@ -82,9 +81,9 @@ class LcmLogReader::Impl {
     return begins_like_event(offset + header.event_bytes());
   }
 
-  /// When no event follows, either this header's lengths are damaged or the next header is. It is
-  /// the next one if something stands there that was a header: the number that follows this one's,
-  /// or lengths that lead to the next event beyond doubt.
+  /// If no event follows, either this header's lengths or the next header is damaged. It is the
+  /// next header if remains of a header are there: the number after this one's, or lengths that
+  /// lead to a certain next event.
   bool trustworthy(const Header& header) {
     const std::uint64_t end = position_ + header.event_bytes();
     if (followed_by_event(position_, header)) return true;
@@ -96,9 +95,9 @@ class LcmLogReader::Impl {
            end + next.event_bytes() == resumes;
   }
 
-  /// Where the first event at or behind `offset` starts that is followed by another one or by the
-  /// end of the file; the size of the file when there is none. The answer is kept, so that the
-  /// whole file is searched once at most.
+  /// Offset of the first event at or after `offset` that is followed by another event or by the end
+  /// of the file; the size of the file if there is none. The result is stored, so that the whole
+  /// file is searched at most once.
   std::uint64_t confirmed_from(std::uint64_t offset) {
     if (offset <= confirmed_) return confirmed_;
     std::uint64_t at = offset;
@@ -110,8 +109,8 @@ class LcmLogReader::Impl {
     return confirmed_ = std::min(at, file_.size());
   }
 
-  /// Where the magic number next occurs, at or behind `offset`; the size of the file when nowhere.
-  /// Holes of the file are passed over: they read as zeros, of which the number has none.
+  /// Offset of the next magic number at or after `offset`; the size of the file if there is none.
+  /// Holes of the file are skipped: they read as zeros, and the number has none.
   std::uint64_t find_magic(std::uint64_t offset) {
     constexpr std::size_t kStep = 65536;
     while ((offset = file_.data_from(offset)) < file_.size()) {
@@ -151,8 +150,8 @@ class LcmLogReader::Impl {
       return std::nullopt;
     }
 
-    // Only a gap across damage is a loss: a log that was cut or filtered has gaps by intent. Two
-    // billion is more than any damage can hide.
+    // Only a gap across damage is a loss: a cut or filtered log has intended gaps. No damage hides
+    // more than two billion events.
     if (in_place_ && event.number > next_number_ && event.number - next_number_ < (1LL << 31)) {
       damage_.events_lost += static_cast<std::uint64_t>(event.number - next_number_);
     }

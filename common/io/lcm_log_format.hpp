@@ -1,4 +1,4 @@
-// The header of an event in an LCM log: encoding, decoding, and what is plausible.
+// The header of an event in an LCM log: encoding, decoding, and plausibility.
 #pragma once
 
 #include <array>
@@ -32,10 +32,10 @@ std::array<std::uint8_t, kHeaderBytes> encode(const Header& header);
 Header decode_fields(std::span<const std::uint8_t, kHeaderBytes> bytes);
 /// None when the bytes cannot start an event: wrong magic, or lengths that LCM never writes.
 std::optional<Header> decode(std::span<const std::uint8_t, kHeaderBytes> bytes);
-/// Whether LCM could have such a channel name: printable ASCII.
+/// Whether this is a possible channel name: printable ASCII.
 bool plausible_channel(std::span<const std::uint8_t> name);
 
-/// Whether a file begins as a log does; also false where it cannot be read.
+/// Whether a file begins like a log; false also where it is not readable.
 bool begins_as_log(const std::filesystem::path& file);
 
 }  // namespace understory::io

@@ -20,7 +20,7 @@ class LcmLogWriter::Impl {
   Impl(const std::filesystem::path& path, LogCreation creation)
       : path_(target_of(path)), grows_(creation != LogCreation::kWhole) {
     struct stat status {};
-    // A name cannot be given to a device: /dev/full must stay what it is.
+    // A device must not be replaced by a file: /dev/full must stay a device.
     direct_ = ::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode);
     if (direct_) {
       descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
@@ -89,7 +89,7 @@ class LcmLogWriter::Impl {
   }
 
  private:
-  /// A link stays what it is: its target is written.
+  /// A link stays a link: its target is written.
   static std::filesystem::path target_of(const std::filesystem::path& path) {
     try {
       return behind_links(path);
@@ -105,7 +105,7 @@ class LcmLogWriter::Impl {
       temporary_.clear();
       return;
     }
-    // mkostemp makes it private; the user's mask shall decide, as for any other file.
+    // mkostemp creates a private file; the user's mask must apply, as for any other file.
     const mode_t mask = ::umask(0);
     ::umask(mask);
     ::fchmod(descriptor_, 0666U & ~mask);
@@ -128,7 +128,7 @@ class LcmLogWriter::Impl {
 
 namespace {
 
-/// What --out names by mistake (a map, a table, a recording) is not lost.
+/// Protects a file given to --out by mistake (a map, a table, a recording).
 const std::filesystem::path& not_another_file(const std::filesystem::path& path) {
   std::error_code failed;
   const bool is_file = std::filesystem::is_regular_file(path, failed);

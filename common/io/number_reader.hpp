@@ -8,7 +8,7 @@
 
 namespace understory::io {
 
-/// Walks a text number by number; line breaks are white space like any other.
+/// Reads a text number by number; line breaks are white space.
 class NumberReader {
  public:
   /// `source` names the text in error messages. The text must outlive the reader.
@@ -17,13 +17,13 @@ class NumberReader {
 
   /// The next finite number, or none at the end of the text. Throws DataError on anything else.
   std::optional<double> next();
-  /// The next number, called `what` in the error when it is missing or no finite number.
+  /// The next number, called `what` in the error when it is missing or not a finite number.
   double require(std::string_view what);
   /// Skips the rest of the present line (e.g. a heading).
   void skip_line();
 
-  std::uint64_t tokens() const { return tokens_; }  ///< Given so far.
-  /// "file, line 3, token 17", of the number given last.
+  std::uint64_t tokens() const { return tokens_; }  ///< Number of tokens so far.
+  /// Place of the last number: "file, line 3, token 17".
   std::string where() const;
 
  private:

@@ -18,14 +18,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// As many as the kernel follows.
+/// The kernel follows the same number.
 constexpr int kMostLinks = 40;
 
 [[noreturn]] void cannot_write(const fs::path& file, int error) {
   throw DataError(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(error)));
 }
 
-/// 0, or the errno of what failed.
+/// Returns 0, or the errno of a failure.
 int put_all(int descriptor, std::string_view text) {
   while (!text.empty()) {
     const ssize_t put = ::write(descriptor, text.data(), text.size());
@@ -36,7 +36,7 @@ int put_all(int descriptor, std::string_view text) {
   return 0;
 }
 
-/// The standard stream that goes to this file; -1 = none.
+/// The standard stream directed to this file; -1 = none.
 int standard_stream_of(const struct stat& file) {
   for (const int descriptor : {STDOUT_FILENO, STDERR_FILENO}) {
     struct stat stream {};
@@ -46,7 +46,7 @@ int standard_stream_of(const struct stat& file) {
   return -1;
 }
 
-/// What was printed before stays in front.
+/// Earlier output stays before it.
 void write_to_stream(int descriptor, const fs::path& file, std::string_view text) {
   std::fflush(descriptor == STDOUT_FILENO ? stdout : stderr);
   if (const int error = put_all(descriptor, text); error != 0) cannot_write(file, error);
@@ -60,7 +60,7 @@ void write_directly(const fs::path& file, std::string_view text) {
   if (error != 0) cannot_write(file, error);
 }
 
-/// mkostemp makes a file private; the user's mask shall decide, as for any other file.
+/// mkostemp makes a file private; the user's mask must apply, as for any other file.
 void give_usual_mode(int descriptor) {
   const mode_t mask = ::umask(0);
   ::umask(mask);

@@ -1,4 +1,4 @@
-// Records of an OXTS inertial and satellite navigation system, as KITTI gives them.
+// Records of an OXTS inertial and satellite navigation system, in the format of KITTI.
 #pragma once
 
 #include <Eigen/Core>

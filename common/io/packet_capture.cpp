@@ -21,7 +21,7 @@ constexpr std::uint16_t kIpv4 = 0x0800;
 constexpr std::array<std::uint16_t, 3> kVlan = {0x8100, 0x88A8, 0x9100};  // IEEE 802.1Q, 802.1ad
 constexpr std::uint8_t kUdp = 17;
 constexpr std::size_t kMostTags = 2;
-constexpr model::Utime kLatest_s = 4'000'000'000;  // the year 2096: damaged files have any time
+constexpr model::Utime kLatest_s = 4'000'000'000;  // the year 2096; later times are damage
 
 using Frame = std::span<const std::uint8_t>;
 
@@ -33,10 +33,10 @@ std::uint32_t network_long_word(Frame frame, std::size_t at) {
   return (static_cast<std::uint32_t>(network_word(frame, at)) << 16U) | network_word(frame, at + 2);
 }
 
-/// How the frames of a link type begin (www.tcpdump.org/linktypes.html).
+/// Header of the frames of a link type (www.tcpdump.org/linktypes.html).
 struct LinkLayer {
   std::size_t header_bytes = 0;
-  std::optional<std::size_t> type_at;  ///< Of the EtherType; none = always IP.
+  std::optional<std::size_t> type_at;  ///< Offset of the EtherType; none = always IP.
 };
 
 std::optional<LinkLayer> link_layer(int link) {
@@ -58,7 +58,7 @@ std::optional<LinkLayer> link_layer(int link) {
   }
 }
 
-/// Behind the link's header and VLAN tags: the IPv4 packet; empty where there is none.
+/// The IPv4 packet after the link's header and VLAN tags; empty = none.
 Frame internet_packet(Frame frame, const LinkLayer& link) {
   if (frame.size() < link.header_bytes) return {};
   if (!link.type_at) return frame.subspan(link.header_bytes);
@@ -78,7 +78,7 @@ Frame internet_packet(Frame frame, const LinkLayer& link) {
 std::optional<IpFragment> ip_fragment(Frame packet) {
   if (packet.size() < kLeastIpBytes || packet[0] >> 4U != 4) return std::nullopt;
   const std::size_t header = 4U * (packet[0] & 0x0FU);
-  // Frames are padded to 60 bytes; a total of 0 is left to the network card to fill in.
+  // Frames are padded to 60 bytes; a total of 0 means that the network card sets it.
   const std::size_t told = network_word(packet, 2);
   const std::size_t size = told == 0 ? packet.size() : told;
   if (header < kLeastIpBytes || packet[9] != kUdp || size > packet.size() || size < header)
@@ -154,7 +154,7 @@ class PacketCapture::Impl {
     void operator()(pcap_t* capture) const { pcap_close(capture); }
   };
 
-  /// The UDP packet that this frame brings or completes.
+  /// The UDP packet in this frame, or completed by it.
   std::optional<CapturedPacket> take(Frame frame, model::Utime utime) {
     const auto fragment = ip_fragment(internet_packet(frame, *link_layer(link_type_)));
     std::optional<CapturedPacket> packet;

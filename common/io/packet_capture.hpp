@@ -13,37 +13,37 @@ namespace understory::io {
 
 /// The payload of one UDP packet.
 struct CapturedPacket {
-  model::Utime utime = 0;         ///< When it was captured [us since the epoch]; of a packet in
-                                  ///< fragments, the one that completed it.
-  std::uint32_t sender = 0;       ///< IPv4, host's byte order.
+  model::Utime utime = 0;    ///< Capture time [us since the epoch]; of a fragmented packet the time
+                             ///< of the completing fragment.
+  std::uint32_t sender = 0;  ///< IPv4, host's byte order.
   std::uint16_t source_port = 0;  ///< UDP.
   std::uint16_t port = 0;         ///< UDP, destination.
   std::vector<std::uint8_t> payload;
 };
 
-/// What was in the file so far.
+/// Counts of the packets read so far.
 struct CaptureCounts {
   std::uint64_t frames = 0;
   std::uint64_t fragments = 0;   ///< Of UDP packets that are larger than a frame.
   std::uint64_t incomplete = 0;  ///< UDP packets of which fragments are missing: left out.
 };
 
-/// Ethernet (with VLAN tags), Linux "cooked" (SLL, SLL2: `tcpdump -i any`), loopback or raw IPv4
-/// below; IPv4, whose fragments are joined; UDP. Times in microseconds or nanoseconds.
+/// Ethernet (with VLAN tags), Linux "cooked" (SLL, SLL2: `tcpdump -i any`), loopback or raw IPv4 as
+/// link layer; IPv4, with joined fragments; UDP. Times in microseconds or nanoseconds.
 class PacketCapture {
  public:
   /// Throws DataError.
   explicit PacketCapture(const std::filesystem::path& path);
   ~PacketCapture();
-  /// Leaves the other one fit for assignment and destruction only.
+  /// The moved-from object permits assignment and destruction only.
   PacketCapture(PacketCapture&&) noexcept;
   PacketCapture& operator=(PacketCapture&&) noexcept;
 
-  /// The next UDP payload; none at the end. A file that ends in the middle of a frame ends there.
+  /// The next UDP payload; none at the end. A file cut within a frame ends there.
   std::optional<CapturedPacket> next();
-  /// What next() came across so far.
+  /// Counts so far.
   const CaptureCounts& counts() const;
-  /// Whether the file ends in the middle of a frame; known once next() gave none.
+  /// Whether the file is cut within a frame; known after next() returned none.
   bool is_cut_off() const;
 
  private:

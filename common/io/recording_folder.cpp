@@ -84,7 +84,7 @@ std::string read_entry(const fs::path& path, std::string_view name, const std::s
 
   std::string content(status.size, '\0');
 
-  // zip_fread checks the checksum of the entry when it reaches its end.
+  // zip_fread checks the checksum at the end of the entry.
   const zip_int64_t got = zip_fread(file.get(), content.data(), content.size());
   char beyond = 0;
   if (got != static_cast<zip_int64_t>(content.size()) || zip_fread(file.get(), &beyond, 1) != 0) {

@@ -1,4 +1,4 @@
-// A recording that comes as several files: in a folder, or in a zip archive as downloaded.
+// A recording of several files, in a folder or in a zip archive.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 
 namespace understory::io {
 
-/// Gives the files of a recording by name, wherever they lie.
+/// Access to the files of a recording by name.
 class RecordingFolder {
  public:
-  /// A folder or a zip archive. Throws DataError when it is neither.
+  /// A folder or a zip archive. Throws DataError when the path is neither.
   explicit RecordingFolder(std::filesystem::path path);
 
   /// The whole content of the file of this name (case and leading folders do not matter). Throws

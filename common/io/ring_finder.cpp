@@ -13,7 +13,7 @@ constexpr double kPi = std::numbers::pi;
 constexpr std::size_t kFewestBeams = 4;
 constexpr std::size_t kMostBeams = 256;
 constexpr std::size_t kFewestPoints = 200;
-/// Beams do not leave from the origin: near points are seen under another elevation.
+/// Beams do not start at the origin: near points have another elevation.
 constexpr double kFar_m = 8.0;
 /// Share of the far points that may lie between the beams.
 constexpr double kMostStray = 0.02;
@@ -38,7 +38,7 @@ std::optional<FoundRings> rings_by_order(std::span<const Eigen::Vector3f> points
   const RingTurns order = find_turns(points, begin_rad);
   if (order.turns < kFewestBeams || order.turns > kMostBeams) return std::nullopt;
 
-  // One beam each: their elevations go one way.
+  // Each turn is one beam if the elevations are monotonic.
   std::vector<double> sum(order.turns, 0.0);
   std::vector<double> count(order.turns, 0.0);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -62,9 +62,9 @@ std::optional<FoundRings> rings_by_order(std::span<const Eigen::Vector3f> points
   return found;
 }
 
-/// The middle of each beam, the lowest first; empty where they do not stand apart.
+/// The middle of each beam, the lowest first; empty where they are not separated.
 std::vector<double> beams_of(std::span<const double> elevations) {
-  // A histogram that is finer than beams lie apart; a beam is a run of bins that are not empty.
+  // A histogram finer than the distance of beams; a beam is a run of non-empty bins.
   constexpr double kBin = 0.02 * kPi / 180.0;
   constexpr double kLowest = -0.5 * kPi;
   const auto bins = static_cast<std::size_t>(kPi / kBin) + 1;
@@ -80,7 +80,7 @@ std::vector<double> beams_of(std::span<const double> elevations) {
   std::vector<Beam> beams;
   for (std::size_t bin = 0; bin < bins; ++bin) {
     if (count[bin] < least) continue;
-    // An empty bin within a beam is chance where the beam has few points.
+    // A beam with few points may have an empty bin by chance.
     if (beams.empty() || bin > beams.back().last + 2) beams.push_back({bin, bin, 0, 0.0});
     beams.back().last = bin;
     beams.back().points += count[bin];
@@ -156,7 +156,7 @@ RingTurns find_turns(std::span<const Eigen::Vector3f> points_m, double begin_rad
 
 FoundRings find_rings(std::span<const Eigen::Vector3f> points_m) {
   if (points_m.size() < kFewestPoints) return {};
-  // KITTI begins ahead; what is sorted by atan2 begins behind. Cut elsewhere, rings are one more.
+  // KITTI begins ahead; points sorted by atan2 begin behind. A cut elsewhere adds one ring.
   const auto ahead = rings_by_order(points_m, 0.0);
   const auto behind = rings_by_order(points_m, -kPi);
   if (ahead && (!behind || ahead->rings <= behind->rings)) return *ahead;

@@ -15,7 +15,7 @@
 namespace understory::io {
 namespace {
 
-/// In units of SI or degrees no sensor of a vehicle reads more; northings end at 1e7 m.
+/// No sensor of a vehicle reads more, in SI units or degrees; northings end at 1e7 m.
 constexpr double kGreatest = 1e9;
 
 /// Rows of numbers under a heading of names.
@@ -76,7 +76,7 @@ class Table {
   }
 
  private:
-  /// Stamps are checked by themselves.
+  /// Stamps are checked separately.
   void take(std::size_t column, double value, const NumberReader& reader) {
     if (std::abs(value) > kGreatest && !names_[column].starts_with("t_")) {
       throw DataError(fmt::format("{}: {} {} is no reading of a sensor", reader.where(),

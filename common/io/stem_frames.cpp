@@ -50,7 +50,7 @@ std::string_view trimmed_cell(std::string_view cell, std::string_view blanks) {
   return cell.substr(first, cell.find_last_not_of(blanks) - first + 1);
 }
 
-/// Lines that hold something, with their numbers.
+/// Lines with content, with their numbers.
 class DataLines {
  public:
   DataLines(std::string_view text, std::string_view source) : text_(text), source_(source) {
@@ -72,7 +72,7 @@ class DataLines {
     throw DataError(fmt::format("{}, line {}: {}", source_, number_, why));
   }
 
-  /// Finite and of at most that size.
+  /// A finite number of at most `most`.
   double number(std::string_view text, std::string_view what, double most,
                 std::string_view unit) const {
     double value = 0.0;
@@ -111,7 +111,7 @@ Cells cells_by_blank(std::string_view line) {
   return cells;
 }
 
-/// Where each column is.
+/// Place of each column.
 using StemColumns = std::array<std::optional<std::size_t>, kStemColumns>;
 
 StemColumns columns_of_heading(const Cells& cells, const DataLines& lines) {
@@ -190,7 +190,7 @@ model::StemFrame frame_of_line(const Cells& cells, const DataLines& lines) {
   return frame;
 }
 
-/// n of frame_<n>.csv; none where the name is another.
+/// n of frame_<n>.csv; none for another name.
 std::optional<std::int64_t> frame_number(const std::filesystem::path& file) {
   constexpr std::string_view kHead = "frame_";
   constexpr std::string_view kTail = ".csv";
@@ -223,7 +223,7 @@ std::map<std::int64_t, std::filesystem::path> frame_files(const std::filesystem:
   return files;
 }
 
-/// Without axes where not every stem has one.
+/// The table has axes only if every stem has one.
 std::string text_of_stems(const model::StemFrame& frame) {
   const bool has_axes =
       std::ranges::none_of(frame.stems, [](const model::Stem& stem) { return stem.axis.isZero(); });

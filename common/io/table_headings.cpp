@@ -14,14 +14,14 @@
 namespace understory::io {
 namespace {
 
-/// Which tables have a heading.
+/// Kinds of tables that have a heading.
 enum class Coordinates : std::uint8_t { kAny, kMetres, kDegrees };
 
 struct KnownHeading {
   std::string_view name;
   LandmarkColumn column;
   Coordinates of = Coordinates::kAny;
-  double factor = 1.0;  ///< By which its numbers become those of the column.
+  double factor = 1.0;  ///< Factor from its numbers to the column's unit.
 };
 
 constexpr auto kX = LandmarkColumn::kX;
@@ -52,10 +52,10 @@ constexpr std::array kKnownHeadings{KnownHeading{"x", kX, kInMetres},
                                     KnownHeading{"radius", kDiameter, Coordinates::kAny, 2.0},
                                     KnownHeading{"kind", LandmarkColumn::kKind}};
 
-/// What --columns calls them.
+/// Names in --columns.
 constexpr std::array<std::string_view, kLandmarkColumns> kRoleNames{"x", "y", "sigma", "dbh",
                                                                     "kind"};
-/// Letters by which a heading may differ from a known one to be meant for it.
+/// Largest number of different letters for a similar heading.
 constexpr std::size_t kNear = 3;
 
 struct Unit {
@@ -71,7 +71,7 @@ constexpr std::array kUnits{Unit{"m", 1.0},          Unit{"cm", 0.01},       Uni
 constexpr const char* kUnitNames = "m, cm, mm, in, ft";
 constexpr std::array<std::string_view, 2> kDegreeUnits{"deg", "degrees"};
 
-/// None of a word that is no unit of length.
+/// Metres per unit; none for a word that is not a unit of length.
 std::optional<double> length_m(std::string_view word) {
   const auto* const found = std::ranges::find(kUnits, word, &Unit::name);
   return found == kUnits.end() ? std::nullopt : std::optional(found->metres);
@@ -79,13 +79,13 @@ std::optional<double> length_m(std::string_view word) {
 
 bool is_foot(double unit_m) { return std::abs(unit_m - kFoot_m) < 1e-5; }
 
-/// A heading without what differs from table to table, and its unit.
+/// A normalised heading, and its unit.
 struct PlainHeading {
   std::string name;
   std::string unit;  ///< Empty where none is written.
 };
 
-/// Small letters and digits; the last word is the unit where it is one, or stands in brackets.
+/// Small letters and digits; the last word is the unit if it is a known one or in brackets.
 PlainHeading plain(std::string_view heading) {
   std::vector<std::string> words(1);
   bool has_brackets = false;
@@ -123,7 +123,8 @@ bool is_of(const KnownHeading& known, const CoordinateUnit& unit) {
 
 bool is_coordinate(LandmarkColumn column) { return column == kX || column == kY; }
 
-/// Feet are those of the reference system: there are several, and at 2,000 km they differ by 4 m.
+/// Feet are those of the reference system: there are several kinds, which differ by 4 m at 2,000
+/// km.
 std::optional<double> coordinate_unit(std::string_view written, const CoordinateUnit& unit) {
   if (written.empty()) return unit.is_degrees ? 1.0 : unit.metres;
   if (unit.is_degrees)
@@ -162,7 +163,7 @@ double unit_m(const PlainHeading& heading, std::string_view written, LandmarkCol
   return *length;
 }
 
-/// Letters that must be changed, added or left out to make one of the other (Levenshtein).
+/// Letters that must be changed, added or left out to change one into the other (Levenshtein).
 std::size_t distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -237,7 +238,7 @@ void take_named(TableHeadings& result, std::span<const std::string> headings,
        {place, known.factor * unit_m(with_unit, one.heading, known.column, coordinates)}, one.role);
 }
 
-/// Headings of the other kind of coordinates say which system is missing.
+/// Headings of the other kind of coordinates show which system is missing.
 void refuse_missing(LandmarkColumn column, const std::vector<std::string>& passed_over,
                     const CoordinateUnit& unit) {
   for (const std::string& heading : passed_over) {

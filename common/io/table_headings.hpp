@@ -1,4 +1,4 @@
-// Headings of surveyors' tables: which column is what, and in which unit.
+// Headings of surveyors' tables: meaning and unit of each column.
 #pragma once
 
 #include <array>
@@ -11,25 +11,25 @@
 
 namespace understory::io {
 
-/// What a column of a table of landmarks can be.
+/// Meaning of a column in a table of landmarks.
 enum class LandmarkColumn : std::size_t { kX, kY, kSigma, kDiameter, kKind };
 inline constexpr std::size_t kLandmarkColumns = 5;
 
-/// A column that a person named: `role` as in --columns (x, y, sigma_m, dbh_cm, kind, ...), and the
-/// heading that it has in the file.
+/// A column named by the user: `role` as in --columns (x, y, sigma_m, dbh_cm, kind, ...), and its
+/// heading in the file.
 struct NamedColumn {
   std::string role;
   std::string heading;
 };
 
-/// What coordinates are in, where their headings have no unit.
+/// Unit of coordinates whose headings have no unit.
 struct CoordinateUnit {
-  bool is_degrees = false;    ///< Of longitude and latitude.
-  double metres = 1.0;        ///< Of a projected system, e.g. 0.3048006 (US survey feet).
-  bool is_of_system = false;  ///< A reference system says so, and which foot is meant.
+  bool is_degrees = false;  ///< Coordinates are longitude and latitude.
+  double metres = 1.0;  ///< Metres per unit of a projected system, e.g. 0.3048006 (US survey feet).
+  bool is_of_system = false;  ///< The unit, and the kind of foot, is from a reference system.
 };
 
-/// Where a column stands, and what its numbers are multiplied by to be metres.
+/// Index of a column, and the factor from its numbers to metres.
 struct FoundColumn {
   std::size_t place = 0;
   double unit_m = 1.0;
@@ -38,26 +38,25 @@ struct FoundColumn {
 /// The columns of a table.
 struct TableHeadings {
   std::array<std::optional<FoundColumn>, kLandmarkColumns> columns;
-  std::vector<std::string> passed_over;  ///< Headings of no column that is known.
+  std::vector<std::string> passed_over;  ///< Headings of unknown columns.
 
-  /// Where that column stands; none where the table has none.
+  /// The place of that column; none where the table has no such column.
   const std::optional<FoundColumn>& at(LandmarkColumn column) const {
     return columns[static_cast<std::size_t>(column)];
   }
 };
 
-/// Reads "x=easting,dbh_cm=BHD" as --columns has it. Throws std::invalid_argument with what is
-/// wrong.
+/// Reads "x=easting,dbh_cm=BHD" in the form of --columns. Throws std::invalid_argument with the
+/// fault.
 std::vector<NamedColumn> parse_named_columns(std::string_view text);
 
-/// Recognises headings, whatever their case, blanks and underscores: x, east, easting, rechtswert;
-/// y, north, northing, hochwert; dbh, bhd, diameter; radius; sigma; kind; where coordinates are
-/// degrees, longitude, lon; latitude, lat. A unit stands behind: x_m, "BHD [cm]", dbh_in, y_ft.
-/// Coordinates without one are in `unit`; a diameter, radius or sigma without one is refused, since
-/// its unit is unknown. `named` columns count instead of what is recognised. Throws
-/// std::invalid_argument (a text for the heading's line) where x or y is missing, with the heading
-/// that is nearest; for a column that comes twice, a named one that is not there, an unknown unit,
-/// and degrees where metres are wanted. Cost O(headings times known ones).
+/// Recognises headings, ignoring case, blanks and underscores: x, east, easting, rechtswert; y,
+/// north, northing, hochwert; dbh, bhd, diameter; radius; sigma; kind; for coordinates in degrees
+/// longitude, lon; latitude, lat. A unit may follow: x_m, "BHD [cm]", dbh_in, y_ft. Coordinates
+/// without one are in `unit`; a diameter, radius or sigma without one is refused. `named` columns
+/// replace recognised ones. Throws std::invalid_argument (a text for the heading's line) where x or
+/// y is missing (with the most similar heading), for a repeated column, a missing named one, an
+/// unknown unit, and degrees where metres are required. Cost O(headings times known ones).
 TableHeadings recognise_headings(std::span<const std::string> headings,
                                  std::span<const NamedColumn> named,
                                  const CoordinateUnit& unit = {});

@@ -1,4 +1,4 @@
-// Files that are small enough to be read whole.
+// Reads small files completely.
 #pragma once
 
 #include <filesystem>
@@ -6,8 +6,8 @@
 
 namespace understory::io {
 
-/// All bytes of a file. Throws DataError naming the file where it is no file or cannot be read to
-/// its end.
+/// All bytes of a file. Throws DataError with the file where it is not a file or cannot be read
+/// completely.
 std::string read_whole_file(const std::filesystem::path& file);
 
 }  // namespace understory::io

@@ -26,7 +26,7 @@ std::string_view without_blanks(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
-/// What separates the cells of the line at the beginning of `text`.
+/// The delimiter of the first line of `text`.
 char delimiter_at(std::string_view text) {
   const std::string_view line = text.substr(0, text.find_first_of("\r\n"));
   for (const char one : {';', '\t'}) {
@@ -35,7 +35,7 @@ char delimiter_at(std::string_view text) {
   return ',';
 }
 
-/// A text from its front to its end.
+/// Reads a text from begin to end.
 class TableReader {
  public:
   TableReader(std::string_view text, std::string_view source) : rest_(text), source_(source) {}
@@ -43,7 +43,7 @@ class TableReader {
   bool is_at_end() const { return rest_.empty(); }
   std::string_view rest() const { return rest_; }
 
-  /// The line at the front without its end, passed over.
+  /// Skips the next line; returns it without its end.
   std::string_view pass_line() {
     const std::size_t size = std::min(rest_.find_first_of("\r\n"), rest_.size());
     const std::string_view line = rest_.substr(0, size);
@@ -52,7 +52,7 @@ class TableReader {
     return line;
   }
 
-  /// Blank, or a comment.
+  /// Whether the line is blank or a comment.
   bool is_without_content() const {
     const std::string_view line =
         without_blanks(rest_.substr(0, std::min(rest_.find_first_of("\r\n"), rest_.size())));
@@ -82,7 +82,7 @@ class TableReader {
     ++line_;
   }
 
-  /// Up to the delimiter or the end of the line, which stay.
+  /// Reads up to the delimiter or the end of the line, which stay.
   std::string_view plain_part(char delimiter) {
     const auto is_end = [&](char one) { return one == delimiter || one == '\n' || one == '\r'; };
     const auto end = std::ranges::find_if(rest_, is_end);
@@ -103,7 +103,7 @@ class TableReader {
     return text;
   }
 
-  /// A doubled quotation mark is one.
+  /// Reads a quoted part; a doubled quotation mark means one.
   std::string quoted_part() {
     const std::uint64_t begin = line_;
     std::string text;
@@ -118,7 +118,7 @@ class TableReader {
     refuse_line(source_, begin, "a quotation mark is not closed");
   }
 
-  /// Whether the front ends a line; of CR LF the second one does.
+  /// Whether the next character ends a line; of CR LF it is the LF.
   bool ends_line() const {
     return rest_.front() == '\n' || (rest_.front() == '\r' && !rest_.starts_with("\r\n"));
   }

@@ -17,8 +17,8 @@ constexpr std::uint16_t kLowerFlag = 0xDDFF;
 constexpr int kTurn = 36000;  // hundredths of a degree
 constexpr double kHour_us = 3.6e9;
 constexpr std::size_t kMostPointsPerSweep =
-    2'000'000;  // of a revolution; a packet stream without azimuth zero ends here
-constexpr int kLargestStep = 600;  // of the azimuth from packet to packet
+    2'000'000;  // longest revolution; a packet stream without azimuth zero ends here
+constexpr int kLargestStep = 600;  // largest step of the azimuth between packets
 
 std::uint16_t little_endian_word(std::span<const std::uint8_t> packet, std::size_t at) {
   return static_cast<std::uint16_t>(packet[at] | (packet[at + 1] << 8U));
@@ -29,13 +29,13 @@ std::uint32_t little_endian_long_word(std::span<const std::uint8_t> packet, std:
          (static_cast<std::uint32_t>(little_endian_word(packet, at + 2)) << 16U);
 }
 
-/// How the firings of a model lie in a packet.
+/// Layout of a model's firings in a packet.
 struct Layout {
   std::size_t beams = 16;
   std::size_t blocks_per_firing = 1;
   std::size_t firings_per_block = 1;
-  double firing_us = 55.296;  ///< From one firing of all beams to the next.
-  double beam_us = 2.304;     ///< From one shot to the next.
+  double firing_us = 55.296;  ///< Time between two firings of all beams.
+  double beam_us = 2.304;     ///< Time between two shots.
   std::size_t beams_per_shot = 1;
   std::uint8_t product = 0;
 };
@@ -57,7 +57,7 @@ Layout layout_of(VelodyneModel model) {
 bool is_other_product(const Layout& layout, std::uint8_t product) {
   if (layout.product == 0 || product == layout.product) return false;
   const bool known = product == 0x21 || product == 0x22 || product == 0x28;
-  // Puck Hi-Res and Alpha Prime look elsewhere. Old HDL-32E have other things in this byte.
+  // Puck Hi-Res and Alpha Prime have other beam angles. Old HDL-32E use this byte for other values.
   const bool foreign = product == 0x24 || product == 0x63 || product == 0xA1;
   return known || (foreign && layout.product != 0x21);
 }
@@ -86,7 +86,7 @@ std::uint32_t velodyne_packet_time_us(std::span<const std::uint8_t> packet) {
   return little_endian_long_word(packet, kPacketTimeAt);
 }
 
-/// The blocks of a packet, checked.
+/// A checked block of a packet.
 struct VelodyneDecoder::Block {
   std::array<int, kBlocks> azimuth{};
   bool is_dual = false;
@@ -114,14 +114,15 @@ std::optional<model::PointSweep> VelodyneDecoder::take_revolution() {
   sweep.max_range_m = max_range_m_;
   sweep.revolution = revolutions_;
   sweep.sequence = revolutions_++;
-  // What came before the first passage of azimuth zero is part of a revolution.
+  // Points before the first passage of azimuth zero are an incomplete revolution.
   if (!whole) return std::nullopt;
   ++counts_.turns;
   return sweep;
 }
 
 std::optional<model::PointSweep> VelodyneDecoder::finish() {
-  if (last_azimuth_ < kTurn - kLargestStep) revolution_started_ = false;  // not to its end
+  if (last_azimuth_ < kTurn - kLargestStep)
+    revolution_started_ = false;  // it did not reach its end
   return take_revolution();
 }
 
@@ -143,8 +144,8 @@ std::optional<model::PointSweep> VelodyneDecoder::add(std::span<const std::uint8
 
   if (last_azimuth_ >= 0 && azimuth_between(last_azimuth_, block.azimuth[0]) > kLargestStep)
     ++counts_.lost_azimuth;
-  // The revolution ends at the first block behind azimuth zero; the rest of the packet is of the
-  // next.
+  // The revolution ends at the first block after azimuth zero; the rest of the packet belongs to
+  // the next one.
   std::optional<model::PointSweep> sweep;
   if ((last_azimuth_ > block.azimuth[0] && last_azimuth_ - block.azimuth[0] > kTurn / 2) ||
       sweep_.points.size() > kMostPointsPerSweep)
@@ -161,7 +162,7 @@ std::optional<model::PointSweep> VelodyneDecoder::add(std::span<const std::uint8
 void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Block& block) {
   const Layout layout = layout_of(calibration_.model);
   const std::size_t returns = block.is_dual ? 2 : 1;
-  const std::size_t stride = layout.blocks_per_firing * returns;  // blocks from firing to firing
+  const std::size_t stride = layout.blocks_per_firing * returns;  // blocks between firings
   model::PointSweep* sweep = &sweep_;
 
   for (std::size_t b = 0; b + stride <= kBlocks; b += stride) {

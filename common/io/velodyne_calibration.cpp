@@ -1,4 +1,4 @@
-// Where the beams of each model look.
+// Beam directions of each model.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ std::vector<std::uint16_t> rings_of(const std::vector<VelodyneBeam>& beams) {
   return rings;
 }
 
-/// The number behind `key` from `at` on; moves `at` behind it. None where there is no more.
+/// The number after the next `key` from `at` on; moves `at` after it. None at the end.
 std::optional<double> number_after(std::string_view text, std::string_view key, std::size_t& at,
                                    std::size_t end) {
   const std::size_t found = text.find(key, at);
@@ -79,7 +79,7 @@ constexpr Names kYaml = {"laser_id",
                          1.0,
                          1.0};
 
-/// What belongs to one laser lies between two record starts.
+/// The values of one laser are between two record starts.
 VelodyneBeam parse_beam(std::string_view record, const Names& names, const std::string& where) {
   const auto read = [&](std::string_view key, double unit, bool required) {
     std::size_t at = 0;

@@ -10,15 +10,15 @@
 
 namespace understory::io {
 
-/// Position packets in, fixes out: live and from captures alike.
+/// Input: position packets; output: fixes, both live and from captures.
 class VelodyneFixes {
  public:
-  /// From where metres east and north count; none = the first fix.
+  /// `origin` of metres east and north; none = the first fix.
   explicit VelodyneFixes(std::optional<LocalPlane> plane = {}) : plane_(plane) {}
 
-  /// `received`: when the packet came [us]; the fix's stamp. None where the sentence is
-  /// marked as not valid or repeats the last one: the receiver gives one a second, the sensor
-  /// repeats it.
+  /// `received`: reception time of the packet [us], which is the fix's stamp. None where the
+  /// sentence is marked as invalid or repeats the last one: the receiver sends one per second, the
+  /// sensor repeats it.
   std::optional<model::GnssFix> add(const VelodynePosition& position, model::Utime received);
 
  private:

@@ -1,4 +1,4 @@
-// Position packets: where and when, as the GNSS receiver at the laser reports in NMEA.
+// Position packets: position and time in NMEA from the laser's GNSS receiver.
 #include <algorithm>
 #include <charconv>
 #include <cmath>

@@ -15,7 +15,7 @@ namespace understory::io {
 namespace victoria_park {
 namespace {
 
-/// Longest time stamp that is believed [s]: far beyond the recording, far below an overflow.
+/// Largest accepted time stamp [s]: far beyond the recording, far below an overflow.
 constexpr double kMaxTime_s = 1e6;
 
 /// Reads the time stamp that starts a record; none at the end of the file. Time must advance.

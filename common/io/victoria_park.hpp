@@ -2,7 +2,7 @@
 // with a laser that sweeps a plane, an encoder on a rear wheel, a steering sensor and GPS, driven
 // among trees.
 //
-// Read as it is downloaded: victoria_park_ascii.zip, or a folder with its LASER.txt, DRS.txt and
+// Input is the published victoria_park_ascii.zip, or a folder with its LASER.txt, DRS.txt and
 // GPS.txt. Times become microseconds from the recording's first GPS fix.
 #pragma once
 
@@ -22,21 +22,22 @@ struct VictoriaPark {
   std::vector<model::PlanarScan> scans;  ///< 7230, every 0.214 s; frame `sensor` (the laser).
   std::vector<model::WheelSample>
       wheels;                        ///< 61763, every 0.025 s; encoder on the rear left wheel.
-  std::vector<model::GnssFix> gnss;  ///< 948 fixes left after the authors removed bad ones.
+  std::vector<model::GnssFix> gnss;  ///< 948 fixes; the authors removed bad ones.
 };
 
 namespace victoria_park {
 
-constexpr std::size_t kBeams = 361;      ///< 0.5 degrees apart, from the right to the left.
-constexpr double kMaxRange_m = 80.0;     ///< A greater reading means "no return".
-constexpr double kWheelbase_m = 2.83;    ///< [L]
-constexpr double kEncoderLeft_m = 0.76;  ///< [H] Of the encoder's wheel, left of the middle.
-constexpr double kLaserAhead_m = 3.78;   ///< [L + a] Of the rear axle.
-constexpr double kLaserLeft_m = 0.5;     ///< [b] Of the middle of the car.
+constexpr std::size_t kBeams = 361;    ///< 0.5 degrees apart, from the right to the left.
+constexpr double kMaxRange_m = 80.0;   ///< A greater reading means "no return".
+constexpr double kWheelbase_m = 2.83;  ///< [L]
+/// [H] Offset of the encoder's wheel to the left of the middle.
+constexpr double kEncoderLeft_m = 0.76;
+constexpr double kLaserAhead_m = 3.78;  ///< [L + a] Distance ahead of the rear axle.
+constexpr double kLaserLeft_m = 0.5;    ///< [b] Offset to the left of the middle of the car.
 
 /// Frame `vehicle` of this recording: the laser, x forward, relative to the middle of the rear
-/// axle. The field of view of a scan is a sector around the vehicle, so the vehicle is where the
-/// laser is.
+/// axle. A scan's field of view is a sector around the vehicle, so the vehicle's origin is the
+/// laser.
 inline geometry::SE2 axle_T_vehicle() {
   return {victoria_park::kLaserAhead_m, victoria_park::kLaserLeft_m, 0.0};
 }

@@ -57,7 +57,7 @@ void WholeFile::open_temporary() {
   temporary_ = path_.string() + ".part-XXXXXX";
   descriptor_ = ::mkostemp(temporary_.data(), O_CLOEXEC);
   if (descriptor_ < 0) return temporary_.clear();
-  // mkostemp makes a file private; the user's mask shall decide, as for any other file.
+  // mkostemp makes a file private; the user's mask must apply, as for any other file.
   const mode_t mask = ::umask(0);
   ::umask(mask);
   ::fchmod(descriptor_, 0666U & ~mask);

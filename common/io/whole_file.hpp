@@ -1,4 +1,4 @@
-// A file that is written piece by piece, and is there whole or not at all.
+// A file that is written piece by piece and exists completely or not at all.
 #pragma once
 
 #include <cstdint>
@@ -8,18 +8,18 @@
 
 namespace understory::io {
 
-/// Writes into a temporary file beside `path`, which takes its name in commit(); without commit()
-/// nothing is left behind. Links are followed; devices and pipes are written directly. Memory: none
-/// but what the caller hands over.
+/// Writes into a temporary file beside `path`, which commit() renames; without commit() no file is
+/// left. Links are followed; devices and pipes are written directly. It needs no memory beyond the
+/// caller's data.
 class WholeFile {
  public:
-  /// Throws DataError naming the file and the cause when it cannot be created.
+  /// Throws DataError with the file and the cause where it cannot be created.
   explicit WholeFile(const std::filesystem::path& path);
   ~WholeFile();
   WholeFile(const WholeFile&) = delete;
   WholeFile& operator=(const WholeFile&) = delete;
 
-  /// Appends; throws DataError (a full disk, say).
+  /// Appends; throws DataError (e.g. a full disk).
   void write(std::string_view bytes);
   /// Flushes to the device and gives the file its name; no write() may follow. Throws DataError.
   void commit();
@@ -31,7 +31,7 @@ class WholeFile {
   void open_temporary();
 
   std::filesystem::path path_;
-  std::string temporary_;  ///< Empty: the file is written directly, or has its name.
+  std::string temporary_;  ///< Empty if the file is written directly or already has its name.
   bool is_direct_ = false;
   int descriptor_ = -1;
   std::uint64_t size_ = 0;
