@@ -20,7 +20,7 @@ constexpr std::array<double, 4> kWeights{0.3626837833783620, 0.3137066458778873,
 /// Longest panel: in periods of the highest bin, and as part of the perimeter for the short series
 /// of the rotation below to converge. The descriptor of a polygon is then within 0.005 of the exact
 /// integral in 99 of 100 cases, within 0.3 where an edge passes so close to the centroid that the
-/// distance has a kink; what it does not depend on, it does not depend on in any case.
+/// distance has a kink; the invariances hold in all cases.
 constexpr double kMaxPanelPeriods = 2.0;
 constexpr double kMaxPanelPart = 0.25;
 
@@ -50,8 +50,8 @@ class Spectrum {
  public:
   explicit Spectrum(int bins) : bins_(bins) {}
 
-  /// Adds a stretch of edge. `middle` is relative to the centroid, `half` leads from there to the
-  /// stretch's end [m]; phases are 2 pi times the part of the perimeter.
+  /// Adds a part of an edge. `middle` is relative to the centroid, `half` is the vector from there
+  /// to the part's end [m]; phases are 2 pi times the fraction of the perimeter.
   void add(const Eigen::Vector2d& middle, const Eigen::Vector2d& half, double middle_phase,
            double half_phase) {
     const auto cosine = static_cast<float>(std::cos(middle_phase));

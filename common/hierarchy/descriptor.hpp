@@ -1,4 +1,4 @@
-// What a polygon looks like, whatever its pose and wherever one starts to walk round it.
+// Shape descriptor of a polygon, invariant to pose and first vertex.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,17 +8,17 @@
 
 namespace understory::hierarchy {
 
-/// Most distinct bins that a descriptor has: descriptor_step >= 1/30.
+/// Largest number of distinct bins of a descriptor: descriptor_step >= 1/30.
 inline constexpr std::size_t kMaxDescriptorBins = 16;
 
 /// Magnitudes of the spectrum of the distance to the centroid along the perimeter (GeoSLAM §3.2.2)
 /// [m, times the number of samples]. Bin 0 is the mean distance. Unused bins are zero.
 ///
-/// The thesis samples 1/s points from some vertex on and takes all 1/s bins of their DFT. That
-/// depends on the vertex, by as much as its threshold tau. Here the Fourier integral is taken
-/// along the edges instead, which is what the samples approximate. Only the distinct bins
-/// 0 ... 1/(2s) are kept; all but bin 0 are weighted by sqrt(2), for their mirror images. So
-/// Euclidean distances and tau have the units of the thesis.
+/// The thesis samples 1/s points from an arbitrary vertex and uses all 1/s bins of their DFT. The
+/// result depends on the vertex by as much as the threshold tau. Here the Fourier integral along
+/// the edges is used, which the samples approximate. Only the distinct bins 0 ... 1/(2s) are
+/// stored; all but bin 0 are weighted by sqrt(2), for their mirror images. So Euclidean distances
+/// and tau have the units of the thesis.
 using Descriptor = std::array<float, kMaxDescriptorBins>;
 
 /// Number of samples 1/s of a step. Precondition: 1/30 <= step <= 1/4.

@@ -7,7 +7,7 @@ namespace understory::hierarchy {
 namespace {
 
 /// Bits per coordinate of a cell in its key; values beyond are clamped into the last cell, which
-/// keeps neighbours in order and so every query exact.
+/// keeps the order of cells, so every query stays exact.
 constexpr std::int32_t kMaxCell = (1 << 21) - 1;
 
 }  // namespace
@@ -80,7 +80,7 @@ void DescriptorIndex::within(const Descriptor& descriptor, float radius,
   double cells = 1.0;
 
   for (std::size_t i = 0; i < kBins.size(); ++i) {
-    // A little wider than the radius: the subtraction rounds, the distance is what decides.
+    // Slightly wider than the radius, because the subtraction rounds; the exact distance decides.
     const float reach = radius + 1e-4F * (1.0F + descriptor[kBins[i]]);
     low[i] = cell_of(descriptor[kBins[i]] - reach);
     high[i] = cell_of(descriptor[kBins[i]] + reach);

@@ -9,16 +9,16 @@
 
 namespace understory::hierarchy {
 
-/// A set of descriptors under keys of the caller's, to which single ones are added and taken away
-/// in constant time. A distance is never less than the difference in any bin; so descriptors are
-/// kept in square cells over the bins that vary most, and a query looks only into the cells within
-/// its radius. Exact for every radius; fastest up to about the size of a cell.
+/// A set of descriptors with the caller's keys; adding and removing one takes constant time. A
+/// distance is at least the difference in any bin, so descriptors are stored in square cells over
+/// the bins that vary most, and a query visits only the cells within its radius. Exact for every
+/// radius; fastest up to about the size of a cell.
 class DescriptorIndex {
  public:
   /// A descriptor found, by its key.
   struct Hit {
     std::uint32_t key = 0;
-    float distance = 0.0F;  ///< As hierarchy::distance() gives it.
+    float distance = 0.0F;  ///< As from hierarchy::distance().
   };
 
   /// `cell_size` in units of a descriptor's distance; > 0.
@@ -26,7 +26,7 @@ class DescriptorIndex {
 
   /// Adds a descriptor in constant time. Precondition: `key` is not in the index.
   void insert(std::uint32_t key, const Descriptor& descriptor);
-  /// `descriptor` is the one that `key` was inserted with. Returns whether it was there.
+  /// `descriptor` is the one that `key` was inserted with. Returns whether it existed.
   bool erase(std::uint32_t key, const Descriptor& descriptor);
 
   /// Replaces `hits` by all within `radius` (inclusive), nearest first, ties by key.

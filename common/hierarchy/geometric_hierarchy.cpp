@@ -29,7 +29,7 @@ GeometricHierarchy::GeometricHierarchy(std::span<const LandmarkPosition> landmar
     const LandmarkPosition& landmark = landmarks[candidates[i]];
     if (triangulation_.insert(landmark.id, landmark.position_m, change_) == ChangeStatus::kDone) {
       note(change_);
-      rim_.clear();  // only of interest for polygons that stay; there are none yet
+      rim_.clear();  // needed only for unchanged polygons; there are none yet
     } else {
       ++refusals;
     }
@@ -73,7 +73,7 @@ std::vector<ChangeStatus> GeometricHierarchy::move(std::span<const LandmarkPosit
   return statuses;
 }
 
-/// Takes apart the polygons whose triangles are gone, and remembers what has none now.
+/// Removes the polygons of removed triangles, and lists the triangles without a polygon.
 void GeometricHierarchy::note(const TriangulationChange& change) {
   polygon_of_.resize(triangulation_.triangles().size(), kNone);
   is_loose_.resize(triangulation_.triangles().size(), 0);
@@ -107,8 +107,8 @@ void GeometricHierarchy::set_loose(std::uint32_t triangle) {
   }
 }
 
-/// Makes polygons of all loose triangles. A polygon that a loose triangle now reaches across a
-/// dropped edge becomes part of it.
+/// Makes polygons of all loose triangles. A polygon that a loose triangle reaches across a dropped
+/// edge is merged.
 void GeometricHierarchy::remake_polygons() {
   for (std::size_t i = 0; i < loose_.size(); ++i) {
     if (triangulation_.is_triangle(loose_[i])) {
@@ -171,8 +171,8 @@ void GeometricHierarchy::make_polygon(std::uint32_t first_triangle) {
   index_.insert(index, polygon.descriptor);
 }
 
-/// A triangle beside a change may have come to lie on the hull, or no longer lie there, while its
-/// polygon stayed.
+/// A triangle beside a change may now lie on the hull, or no longer, while its polygon is
+/// unchanged.
 void GeometricHierarchy::recount_hull_edges() {
   for (const std::uint32_t triangle : rim_) {
     if (!triangulation_.is_triangle(triangle)) {

@@ -1,4 +1,4 @@
-// Landmarks -> triangles -> polygons -> descriptors -> index, kept true in place.
+// Landmarks -> triangles -> polygons -> descriptors -> index, updated in place.
 #pragma once
 
 #include <cstdint>
@@ -23,17 +23,17 @@ struct LandmarkPosition {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
 };
 
-/// The geometric hierarchy of a set of landmarks (GeoSLAM §3.2). A change costs what it touches: a
-/// handful of triangles and the polygons that they belong to (asked for in GeoSLAM §7.1). The
-/// hierarchy depends on the set of landmarks alone, not on its history; only the numbering of
-/// slots, triangles and polygons does.
+/// The geometric hierarchy of a set of landmarks (GeoSLAM §3.2). A change costs only the changed
+/// triangles (a handful) and their polygons (future work in GeoSLAM §7.1). The hierarchy depends on
+/// the set of landmarks alone, not on its history; only the numbering of slots, triangles and
+/// polygons does.
 class GeometricHierarchy {
  public:
   /// An empty hierarchy.
   explicit GeometricHierarchy(const HierarchyParameters& parameters = {});
-  /// From many landmarks at once, each polygon made once. Of several with one id the first is
-  /// taken, of several at one place any one; they and those not finite are counted in `refused`, if
-  /// given.
+  /// Builds from many landmarks at once, each polygon once. Of several with one id the first is
+  /// used, of several at one position any one; the others and positions that are not finite are
+  /// counted in `refused`, if given.
   explicit GeometricHierarchy(std::span<const LandmarkPosition> landmarks,
                               const HierarchyParameters& parameters = {},
                               std::size_t* refused = nullptr);
@@ -46,19 +46,19 @@ class GeometricHierarchy {
   /// Gives a landmark a new position. Refused (and nothing is changed): an unknown id, a position
   /// taken, a position that is not finite.
   ChangeStatus move(std::uint64_t id, const Eigen::Vector2d& position_m);
-  /// Many moves, after which each polygon is made once (the graph has moved the map). Returns one
-  /// status per landmark.
+  /// Many moves, after which each polygon is made once; for corrections of the whole map. Returns
+  /// one status per landmark.
   std::vector<ChangeStatus> move(std::span<const LandmarkPosition> landmarks);
 
   /// The triangulation on which the polygons are built.
   const Triangulation& triangulation() const { return triangulation_; }
-  /// By index; those with !exists() are free.
+  /// Polygons by index; an index with !exists() is free.
   std::span<const Polygon> polygons() const { return polygons_; }
   /// Number of polygons that exist.
   std::size_t polygon_count() const { return polygons_.size() - free_polygons_.size(); }
   /// The polygon that a triangle belongs to.
   std::uint32_t polygon_of(std::uint32_t triangle) const { return polygon_of_[triangle]; }
-  /// Keys are polygon indices.
+  /// Index of descriptors; keys are polygon indices.
   const DescriptorIndex& index() const { return index_; }
   /// As given to the constructor.
   const HierarchyParameters& parameters() const { return parameters_; }
@@ -79,7 +79,7 @@ class GeometricHierarchy {
   std::vector<std::uint32_t> free_polygons_;
   std::vector<std::uint32_t> polygon_of_;  // by triangle
   DescriptorIndex index_;
-  // Work lists of the change at hand; kept for their memory.
+  // Work lists of the present change; members to reuse their memory.
   std::vector<std::uint32_t> loose_;  // triangles without a polygon, each once
   std::vector<char> is_loose_;        // by triangle
   std::vector<std::uint32_t> rim_;

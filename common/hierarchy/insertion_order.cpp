@@ -1,4 +1,4 @@
-// Apart from triangulation.cpp for the sake of its compile time.
+// Separate from triangulation.cpp to reduce compile time.
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Spatial_sort_traits_adapter_2.h>
 #include <CGAL/property_map.h>

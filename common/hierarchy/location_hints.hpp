@@ -1,4 +1,4 @@
-// Somewhere to start walking from: for a place, a landmark that is probably close by.
+// Start points of searches: for a position, a landmark that is probably close.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,15 +9,15 @@
 
 namespace understory::hierarchy {
 
-/// Remembers one landmark slot per square cell. An answer is only a hint: it may be stale (the
-/// reader checks that the slot is in use) and decides nothing but the length of a walk.
+/// Stores one landmark slot per square cell. The result is only a hint: it may be outdated (the
+/// caller checks that the slot is in use) and affects only the length of a search.
 class LocationHints {
  public:
-  /// Makes `slot` the answer for the cell of this place.
+  /// Stores `slot` for the cell of this position.
   void remember(const Eigen::Vector2d& position_m, std::uint32_t slot) {
     cells_[key(cell(position_m.x()), cell(position_m.y()))] = slot;
   }
-  /// Takes `slot` out where it is the one remembered for this place; `replacement` takes over.
+  /// Replaces `slot` by `replacement` if `slot` is stored for this position.
   void forget(const Eigen::Vector2d& position_m, std::uint32_t slot,
               std::optional<std::uint32_t> replacement) {
     const auto found = cells_.find(key(cell(position_m.x()), cell(position_m.y())));
@@ -30,7 +30,7 @@ class LocationHints {
       cells_.erase(found);
     }
   }
-  /// From the place's own cell or one of the eight around it.
+  /// A slot from the position's own cell or one of the eight around it.
   std::optional<std::uint32_t> near(const Eigen::Vector2d& position_m) const {
     const std::int64_t x = cell(position_m.x());
     const std::int64_t y = cell(position_m.y());
@@ -50,7 +50,8 @@ class LocationHints {
   }
 
  private:
-  /// A few tree spacings: most cells of a forest hold a landmark, and the walk from it is short.
+  /// A few tree spacings: most cells of a forest contain a landmark, and the search from it is
+  /// short.
   static constexpr double kCellSize = 16.0;  // [m]
 
   static std::int64_t cell(double coordinate_m) {

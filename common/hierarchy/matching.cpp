@@ -16,7 +16,8 @@ namespace {
 /// Landmark slots: query, map.
 using SlotPair = std::pair<std::uint32_t, std::uint32_t>;
 
-/// What a match is worth where the view ends: a polygon there is often not the same from elsewhere.
+/// Weight of a match at the border of the view: from another viewpoint such a polygon is often
+/// different.
 constexpr double kHullTrust = 0.5;
 
 const DescriptorIndex::Hit* nearest_of_like_size(const GeometricHierarchy& hierarchy,
@@ -52,8 +53,7 @@ std::vector<TriangleShape> shapes_of(const Triangulation& triangulation, const P
   return shapes;
 }
 
-/// How two triangles fit best: vertex i of the first on vertex i + shift of the
-/// second.
+/// Best fit of two triangles: vertex i of the first on vertex i + shift of the second.
 struct Fit {
   double cost = std::numeric_limits<double>::infinity();
   std::size_t shift = 0;
@@ -112,7 +112,7 @@ std::map<SlotPair, int> vote(const std::vector<TriangleShape>& a,
   return static_cast<double>(matched) < required ? std::map<SlotPair, int>{} : votes;
 }
 
-/// Takes pairs in the given order as long as neither side is taken already.
+/// Takes pairs in the given order if neither side is taken already.
 std::vector<SlotPair> one_to_one(const std::vector<SlotPair>& ordered) {
   std::vector<SlotPair> result;
   for (const SlotPair& pair : ordered) {
@@ -125,13 +125,13 @@ std::vector<SlotPair> one_to_one(const std::vector<SlotPair>& ordered) {
   return result;
 }
 
-/// Lays the query's polygon onto the map's and finds which of their landmarks coincide.
+/// Aligns the query's polygon with the map's and finds their coincident landmarks.
 class PolygonAlignment {
  public:
   PolygonAlignment(const Triangulation& query, const Triangulation& map, double max_residual_m)
       : query_(query), map_(map), max_residual_m_(max_residual_m) {}
 
-  /// Drops the worst pair until all agree with one motion; none if fewer than three do.
+  /// Drops the worst pair until the others agree with one motion; none if fewer than three remain.
   std::optional<geometry::SE2> agree(std::vector<SlotPair> pairs) const {
     while (pairs.size() >= 3) {
       const geometry::SE2 map_T_query = align(pairs);

@@ -13,9 +13,10 @@ struct MatchParameters {
   double max_descriptor_distance = 2.0;   ///< [tau]
   int max_side_difference = 3;            ///< [Delta_N] sides of two polygons.
   double min_triangle_match_ratio = 0.5;  ///< [eta] of the triangles of the smaller polygon.
-  /// Each edge of two matched triangles; about four times the noise of a landmark.
+  /// Largest difference of each edge of two matched triangles; about four times the noise of a
+  /// landmark.
   double max_edge_difference_m = 0.6;
-  /// Of a landmark pair after the two polygons are laid onto each other.
+  /// Largest distance of a landmark pair after alignment of the two polygons.
   double max_residual_m = 0.5;
 };
 
@@ -30,28 +31,28 @@ struct PolygonMatch {
 struct LandmarkMatch {
   std::uint64_t query_id = 0;
   std::uint64_t map_id = 0;
-  /// Pairs beyond the two that fix a transform, summed over the polygon matches that agree on this
-  /// pair; each match counts less for a large descriptor distance and where it touches a hull.
+  /// Sum, over the polygon matches with this pair, of their pairs beyond the two that determine a
+  /// transform; a match has less weight for a large descriptor distance and if it touches a hull.
   double score = 0.0;
 };
 
 /// Mutually nearest polygons (GeoSLAM §3.2.3, §4.5.4), in order of the query's polygon indices. The
-/// map is only asked through its index: time does not grow with the map but with its polygons
-/// within tau.
+/// map is accessed through its index only: time grows with the map's polygons within tau, not with
+/// the map.
 std::vector<PolygonMatch> match_polygons(const GeometricHierarchy& query,
                                          const GeometricHierarchy& map,
                                          const MatchParameters& parameters = {});
 
-/// Landmark pairs that one polygon match gives; empty if too few of its triangles match. Mirror
-/// images never match: triangles are compared in their counter-clockwise order, and the pairs must
-/// fit one rigid motion.
+/// Landmark pairs of one polygon match; empty if too few of its triangles match. Mirror images
+/// never match: triangles are compared in their counter-clockwise order, and the pairs must fit one
+/// rigid motion.
 std::vector<LandmarkMatch> match_landmarks(const GeometricHierarchy& query,
                                            const GeometricHierarchy& map, const PolygonMatch& match,
                                            const MatchParameters& parameters = {});
 
 /// All landmark pairs between a query and a map, best first. No landmark is in two pairs: of
-/// conflicting ones the higher score wins. Different matches need not agree on one motion: the
-/// caller has to find it.
+/// conflicting pairs the one with the higher score is used. Different matches may imply different
+/// motions; the caller must find the common one.
 std::vector<LandmarkMatch> match(const GeometricHierarchy& query, const GeometricHierarchy& map,
                                  const MatchParameters& parameters = {});
 

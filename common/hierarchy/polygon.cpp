@@ -9,7 +9,7 @@ int index_in(const Triangle& triangle, std::uint32_t vertex) {
   return triangle.vertices[0] == vertex ? 0 : (triangle.vertices[1] == vertex ? 1 : 2);
 }
 
-/// Turns the walk so that its sequence of ids is the smallest possible.
+/// Rotates the walk so that its sequence of ids is smallest.
 void start_at_smallest(const Triangulation& triangulation, std::vector<std::uint32_t>& walk) {
   const std::size_t size = walk.size();
   const auto id = [&](std::size_t start, std::size_t i) {
@@ -47,7 +47,7 @@ bool is_dropped(const Triangulation& triangulation, std::uint32_t index, int edg
 
 std::vector<std::uint32_t> boundary_of(const Triangulation& triangulation,
                                        const std::vector<std::uint32_t>& triangles) {
-  // Some edge that is not dropped exists: a tree of n triangles has 3n - 2(n - 1) > 0 of them.
+  // An edge that is not dropped exists: a tree of n triangles has 3n - 2(n - 1) > 0 of them.
   std::uint32_t index = triangles.front();
   int edge = 0;
   for (const std::uint32_t candidate : triangles) {

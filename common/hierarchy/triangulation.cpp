@@ -8,8 +8,8 @@
 #include "common/hierarchy/location_hints.hpp"
 
 namespace understory::hierarchy {
-/// The CGAL side. Its faces carry the index of their Triangle; only the faces around a change are
-/// looked at.
+/// The CGAL part. Its faces store the index of their Triangle; a change visits only the faces
+/// around it.
 struct Triangulation::Impl {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
   using Point = Kernel::Point_2;
@@ -47,7 +47,7 @@ struct Triangulation::Impl {
     return {};
   }
 
-  /// Where a new landmark would go.
+  /// Place of a new landmark.
   struct Place {
     Face face;
     Delaunay::Locate_type type{};
@@ -86,7 +86,7 @@ struct Triangulation::Impl {
     }
   }
 
-  /// Gives the finite ones of `faces` new triangles and links their neighbours to them.
+  /// Makes new triangles for the finite `faces` and links their neighbours to them.
   void adopt(const std::vector<Face>& faces, const std::vector<Face>& rim,
              TriangulationChange& change) {
     for (const Face& face : faces) {
@@ -114,7 +114,7 @@ struct Triangulation::Impl {
     }
   }
 
-  /// While fewer than three landmarks, or all in one line: every triangle made anew.
+  /// With fewer than three landmarks, or all in one line: makes every triangle again.
   void adopt_everything(TriangulationChange& change) {
     for (std::uint32_t i = 0; i < self->triangles_.size(); ++i) {
       if (self->is_triangle(i)) {
@@ -153,8 +153,8 @@ struct Triangulation::Impl {
       return vertex;
     }
 
-    // CGAL inserts by flips, which keep their faces: each face that lost its triangle is now one of
-    // those around the new vertex and still carries the old index.
+    // CGAL inserts by flips, which keep their faces: each face that lost its triangle is now at the
+    // new vertex and still has the old index.
     collect_star(vertex, scratch_faces, scratch_rim);
     for (const Face& face : scratch_faces) {
       if (face->info().triangle != kNone) {
@@ -181,8 +181,7 @@ struct Triangulation::Impl {
       }
     }
 
-    // The rim's faces survive the removal, and so does the index of the edge that looks at the
-    // hole.
+    // The removal keeps the rim's faces and the index of their edge at the hole.
     std::vector<int> looks_inside;
     for (std::size_t i = 0; i < scratch_rim.size(); ++i) {
       looks_inside.push_back(scratch_rim[i]->index(scratch_faces[i]));
@@ -202,7 +201,7 @@ struct Triangulation::Impl {
     adopt(scratch_faces, scratch_rim, change);
   }
 
-  /// Replaces scratch_faces by the faces that now fill the hole inside scratch_rim.
+  /// Sets scratch_faces to the faces that fill the hole inside scratch_rim.
   void flood_hole(const std::vector<int>& looks_inside) {
     ++visit;
     scratch_faces.clear();
@@ -239,7 +238,7 @@ struct Triangulation::Impl {
            CGAL::ON_POSITIVE_SIDE;
   }
 
-  /// Moves a vertex if that keeps all triangles; only for one inside the hull.
+  /// Moves a vertex if this keeps all triangles; only for a vertex inside the hull.
   bool move_in_place(Vertex vertex, const Point& point) {
     if (delaunay.dimension() < 2) return false;
 

@@ -12,12 +12,12 @@
 
 namespace understory::hierarchy {
 
-/// What became of a change to a landmark. Everything but kDone leaves the structure as it was.
+/// Result of a change to a landmark. All but kDone leave the structure unchanged.
 enum class ChangeStatus : std::uint8_t {
   kDone = 0,
-  kIdInUse = 1,     ///< Insertion of an id that is already there.
-  kUnknownId = 2,   ///< Removal or move of an id that is not there.
-  kCoincident = 3,  ///< Another landmark is at exactly this place.
+  kIdInUse = 1,     ///< Insertion of an existing id.
+  kUnknownId = 2,   ///< Removal or move of an unknown id.
+  kCoincident = 3,  ///< Another landmark has exactly this position.
   kNotFinite = 4,   ///< A coordinate is infinite or not a number.
 };
 
@@ -27,39 +27,40 @@ inline constexpr std::uint32_t kNone = 0xffffffffU;
 /// A Delaunay triangle, counter-clockwise. Edge i lies opposite vertex i.
 struct Triangle {
   /// The longest edge; of equally long ones the one with the larger landmark ids, so that both
-  /// sides of an edge rank it alike.
+  /// triangles of an edge rank it equally.
   std::uint32_t longest_edge = 0;
-  std::array<std::uint32_t, 3> vertices{kNone, kNone, kNone};    ///< Landmark slots.
-  std::array<std::uint32_t, 3> neighbours{kNone, kNone, kNone};  ///< Across edge i; kNone = hull.
+  std::array<std::uint32_t, 3> vertices{kNone, kNone, kNone};  ///< Landmark slots.
+  /// Triangle across edge i; kNone = hull.
+  std::array<std::uint32_t, 3> neighbours{kNone, kNone, kNone};
 };
 
-/// The triangles that one change touched, for whoever keeps something per triangle.
+/// The triangles affected by one change, for users with data per triangle.
 struct TriangulationChange {
-  std::vector<std::uint32_t> removed;  ///< No longer there; their indices may come again in `made`.
-  std::vector<std::uint32_t> made;     ///< New, or of another shape since a vertex moved.
+  std::vector<std::uint32_t> removed;  ///< Removed; their indices may be reused in `made`.
+  std::vector<std::uint32_t> made;     ///< New, or changed in shape by a moved vertex.
   std::vector<std::uint32_t> rim;      ///< Unchanged, but with another neighbour across an edge.
 
   /// Empties the three lists and keeps their memory.
   void clear();
-  /// Puts an earlier change before this one; `triangles` is what is there after both. Triangles
-  /// made by the first and gone with the second are in `removed` only.
+  /// Puts an earlier change before this one; `triangles`: those after both. Triangles made by the
+  /// first change and removed by the second are in `removed` only.
   void prepend(const TriangulationChange& earlier, std::span<const Triangle> triangles);
 };
 
 /// Delaunay triangulation with insertion, removal and motion of single landmarks, each in time that
-/// does not grow with the map. The result depends on the set of landmarks alone and not on how it
-/// came about: ties between cocircular points are broken by symbolic perturbation in the
+/// does not grow with the map. The result depends on the set of landmarks alone, not on the order
+/// of changes: ties between cocircular points are broken by symbolic perturbation in the
 /// lexicographic order of their coordinates (Devillers & Teillaud 2011). Coordinates are metres in
 /// any one frame.
 ///
-/// Landmarks and triangles are kept in flat arrays; their indices ("slots") are used again after a
-/// removal, ids never are.
+/// Landmarks and triangles are stored in flat arrays; their indices ("slots") are reused after a
+/// removal, ids are not.
 class Triangulation {
  public:
   /// An empty triangulation.
   Triangulation();
   ~Triangulation();
-  /// Leaves the other one fit for assignment and destruction only.
+  /// The moved-from object permits assignment and destruction only.
   Triangulation(Triangulation&&) noexcept;
   Triangulation& operator=(Triangulation&&) noexcept;
   Triangulation(const Triangulation&) = delete;
@@ -113,7 +114,7 @@ class Triangulation {
   std::unordered_map<std::uint64_t, std::uint32_t> slot_of_id_;
 };
 
-/// Order along a space-filling curve in which many insertions are fast.
+/// Order along a space-filling curve, in which many insertions are fast.
 std::vector<std::uint32_t> insertion_order(std::span<const Eigen::Vector2d> positions_m);
 
 }  // namespace understory::hierarchy

@@ -1,4 +1,4 @@
-// The parts of Triangulation that CGAL has no hand in.
+// The parts of Triangulation without CGAL.
 #include <algorithm>
 #include <tuple>
 
