@@ -18,7 +18,7 @@ plane::RelativePose factor_of(const Closure& closure) {
           geometry::symmetric_inverse(closure.from_T_to.covariance)};
 }
 
-/// Solved at its values.
+/// A smoother with the graph, solved at its values.
 plane::Smoother solved(const plane::Graph& graph) {
   plane::Smoother smoother;
   smoother.start_from(graph);
@@ -27,7 +27,7 @@ plane::Smoother solved(const plane::Graph& graph) {
   return smoother;
 }
 
-/// Of the first ones of its poses.
+/// Covariances of its first poses.
 std::vector<Eigen::Matrix3d> covariances_in(const plane::Graph& graph, std::size_t count) {
   std::vector<plane::PoseId> poses;
   poses.reserve(count);

@@ -7,14 +7,14 @@
 namespace understory::map_closure {
 namespace {
 
-/// Paths to both sides that are tried, one after the other [m].
+/// Lengths of path to both sides, tried one after the other [m].
 constexpr std::array<double, 4> kReaches_m{0.0, 30.0, 60.0, 120.0};
-/// Parts of the path between the two that neither takes.
+/// Number of parts between the two that neither window contains.
 constexpr std::size_t kBetween = 1;
 constexpr double kPlaceSigma_m = 0.05;
 constexpr double kPlaceSigma_rad = 0.003;
 
-/// Parts [first, last] whose landmarks count for one of the two.
+/// Parts [first, last] whose landmarks are used for one of the two.
 struct Window {
   std::size_t first = 0;
   std::size_t last = 0;
@@ -26,7 +26,7 @@ double step_m(const PartGraph& graph, std::size_t part) {
       .norm();
 }
 
-/// As far as `reach_m` of path around the part, within [least, most].
+/// The parts up to `reach_m` of path around the part, within `within`.
 Window window_around(const PartGraph& graph, std::size_t part, double reach_m, Window within) {
   Window window{part, part};
   for (double path_m = 0.0; window.first > within.first; --window.first) {
@@ -40,7 +40,7 @@ Window window_around(const PartGraph& graph, std::size_t part, double reach_m, W
   return window;
 }
 
-/// In the frame of the part.
+/// Landmarks of the window in the frame of the part.
 std::vector<model::MapLandmark> landmarks_in(const map_file::StoredMap& map, const PartGraph& graph,
                                              std::size_t part, Window window) {
   const geometry::SE2 part_T_map = graph.parts[part].map_T_part.inverse();
@@ -51,7 +51,8 @@ std::vector<model::MapLandmark> landmarks_in(const map_file::StoredMap& map, con
       model::MapLandmark& one = landmarks.emplace_back(map.landmarks[index].landmark);
       one.position_m = part_T_map * one.position_m;
       one.covariance_m2 = turn * one.covariance_m2 * turn.transpose();
-      // Of the whole map, drift and all: what it is here nobody says.
+      // This covariance is relative to the whole map and includes drift; the one relative to the
+      // part is unknown.
       if (graph.parts[i].is_held) one.covariance_m2.setZero();
     }
   }

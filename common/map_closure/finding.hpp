@@ -1,4 +1,4 @@
-// How two parts of a map lie to each other, found from their landmarks.
+// Finds the relative pose of two parts of a map from their landmarks.
 #pragma once
 
 #include <functional>
@@ -8,20 +8,20 @@
 
 namespace understory::map_closure {
 
-/// What was found. But for `alignment.outcome` it is of the best motion, also where that is not
-/// proven.
+/// Result of the search. All but `alignment.outcome` belongs to the best motion, also where it was
+/// not accepted.
 struct FoundClosure {
   map_merge::Alignment alignment;
-  geometry::SE2WithCovariance from_T_to;  ///< With what a place's own error adds.
-  double reach_m = 0.0;                   ///< Path to both sides whose landmarks it took.
+  geometry::SE2WithCovariance from_T_to;  ///< Includes the own error of a place.
+  double reach_m = 0.0;  ///< Length of path to both sides whose landmarks were used.
 };
 
 /// Looks for the landmarks of the one part among those of the other (map_merge::align), with no
-/// prior, first of the two alone, then with those up to 30, 60 and 120 m further on the path,
-/// never of ground that is nearer to the other part than half the way. What is accepted chance
-/// gives less often than once in 10^9, in all of it. The place of each has an error of its own
-/// beside what the landmarks leave (5 cm, 3 mrad; docs/decisions/093). Throws ClosureError where
-/// the two are neighbours. Cost: of align(), four times at most.
+/// prior, first of the two parts alone, then with the landmarks up to 30, 60 and 120 m further
+/// along the path, but at most to half the way to the other part. The probability of an accepted
+/// motion by chance is below 10^-9 over the whole search. Each place has an own error (5 cm, 3
+/// mrad; docs/decisions/093) beside the error from the landmarks. Throws ClosureError where the two
+/// are neighbours. Cost: at most four calls of align().
 FoundClosure find_closure(
     const map_file::StoredMap& map, const PartGraph& graph, std::size_t from, std::size_t to,
     const map_merge::AlignmentParameters& parameters = {},

@@ -1,4 +1,4 @@
-// A map after its parts have moved.
+// Moves a map with its parts.
 #include <algorithm>
 #include <limits>
 #include <numbers>
@@ -14,17 +14,17 @@ namespace {
 
 using map_file::StoredMap;
 
-/// Smaller moves of a part do not count as such.
+/// Smaller moves of a part do not count.
 constexpr double kMoved_m = 1e-3;
 constexpr double kTurned_rad = 0.01 * std::numbers::pi / 180.0;
-/// A covariance is not taken below this share of what it was, in any direction.
+/// A covariance is not reduced below this share of its old value, in any direction.
 constexpr double kLeastShare = 1e-2;
 
-/// What becomes of one part.
+/// The move of one part.
 struct Move {
-  geometry::SE2 now_T_before;  ///< Frame `map`.
-  geometry::SE2 map_T_part;    ///< Before.
-  /// By so much the covariance of the part's pose changed, where it is in those of what it has.
+  geometry::SE2 now_T_before;  ///< In frame `map`.
+  geometry::SE2 map_T_part;    ///< Before the move.
+  /// Change of the covariance of the part's pose, if the covariances of its content include it.
   std::optional<Eigen::Matrix3d> change;
 };
 
@@ -33,7 +33,8 @@ Eigen::Matrix<double, N, N> symmetric(const Eigen::Matrix<double, N, N>& matrix)
   return 0.5 * (matrix + matrix.transpose());
 }
 
-/// `before` where the change would leave less than nothing: the two are not of one estimate.
+/// The changed covariance; `before` where the result would not be positive definite: the two then
+/// belong to different estimates.
 template <int N>
 Eigen::Matrix<double, N, N> changed(const Eigen::Matrix<double, N, N>& before,
                                     const Eigen::Matrix<double, N, N>& change) {
@@ -77,7 +78,7 @@ std::vector<Move> moves_of(const PartGraph& graph, const ClosedGraph& closed) {
   return moves;
 }
 
-/// Borders and the ends of closures.
+/// Moves borders and the ends of closures.
 void move_drawings(StoredMap& map, const PartGraph& graph, const std::vector<Move>& moves) {
   std::unordered_map<model::SubmapId, std::size_t> of_submap;
   std::unordered_map<std::uint64_t, std::size_t> of_keyframe;
@@ -103,7 +104,7 @@ void move_drawings(StoredMap& map, const PartGraph& graph, const std::vector<Mov
   }
 }
 
-/// The landmarks of a map with their parts, found by place.
+/// Finds landmarks of a map by position, with their parts.
 class Neighbours {
  public:
   Neighbours(const StoredMap& map, const PartGraph& graph, double within_m)
@@ -116,7 +117,7 @@ class Neighbours {
     }
   }
 
-  /// Of another part, no neighbour on the path; itself where there is none.
+  /// The nearest one in another part that is not adjacent on the path; itself where there is none.
   std::uint32_t nearest(std::uint32_t landmark) const {
     const model::MapLandmark& one = map_.landmarks[landmark].landmark;
     std::uint32_t best = landmark;

@@ -22,35 +22,35 @@ namespace plane = factor_graph::plane;
 
 /// Holds the first part to a micrometre.
 constexpr double kHeld = 1e12;
-/// Holds a node of the ground to its piece, to 1 cm and 1 mrad (informations): what is stiffer
-/// makes the optimiser creep.
+/// Holds a node of the ground to its piece, to 1 cm and 1 mrad (informations): a stiffer connection
+/// slows down the optimiser.
 constexpr double kFast_m = 1e4;
 constexpr double kFast_rad = 1e6;
-/// Of a closure that the file keeps without its covariance.
+/// Sigma of a closure stored without covariance.
 constexpr double kClosureSigma_m = 0.1;
 constexpr double kClosureSigma_rad = 0.5 * std::numbers::pi / 180.0;
-/// Parts nearer than this to each other count as so far apart [m].
+/// Least distance assumed between parts [m].
 constexpr double kLeastStep_m = 1.0;
 /// An information with less than this in any direction determines no motion.
 constexpr double kUndetermined = 1e-6;
 
-/// The mapper gives numbers of nodes again. Measurements of another node are farther off than this
-/// [m], [rad].
+/// The mapper reuses numbers of nodes. A measurement with a larger difference belongs to another
+/// node [m], [rad].
 constexpr double kAnother_m = 5.0;
 constexpr double kAnother_rad = 0.3;
-/// A node of a piece of the ground lies so near to the piece's first keyframe [m].
+/// Largest distance of a node from the first keyframe of its piece of the ground [m].
 constexpr double kInPiece_m = 25.0;
 
-/// So many landmarks that two parts observed hold them together.
+/// This many common landmarks connect two parts.
 constexpr int kHoldingPair = 2;
 
-/// Which parts hang together, however.
+/// Groups of connected parts.
 class Groups {
  public:
   explicit Groups(std::size_t size) : parent_(size) {
     std::iota(parent_.begin(), parent_.end(), std::size_t{0});
   }
-  /// Another one, in a group of its own; gives its place.
+  /// Adds a part in a group of its own; returns its index.
   std::size_t add() {
     parent_.push_back(parent_.size());
     return parent_.size() - 1;
@@ -71,7 +71,7 @@ class Groups {
   std::vector<std::size_t> parent_;
 };
 
-/// Puts measurements of parts into the graph. Variables are parts, and behind them nodes of the
+/// Puts measurements of parts into the graph. Variables are the parts, followed by nodes of the
 /// ground.
 class Builder {
  public:
@@ -94,10 +94,10 @@ class Builder {
     const auto from = find(motion.from);
     const auto to = find(motion.to);
     if (!from || !to || *from == *to) return;
-    // Both nodes name it.
+    // Both nodes list it.
     const auto [low, high] = std::minmax(*from, *to);
     if (!known_.emplace(low, high, motion.closure).second) return;
-    // A number is given again: then the motion is of another node.
+    // The number was reused: the motion belongs to another node.
     if (is_far(out_.graph.poses[*from] * motion.from_T_to, out_.graph.poses[*to])) return;
     tie(*from, *to, motion.information);
     if (motion.closure == 0) add_local(*from, *to, motion.information);
@@ -136,7 +136,7 @@ class Builder {
     tie(*from, *to, sigma.array().square().inverse().matrix().asDiagonal());
   }
 
-  /// What one metre of path adds, in the median of neighbours on it.
+  /// Measures the variance per metre of path: the median over adjacent parts.
   void measure_drift() {
     std::array<std::vector<double>, 3> per_m;
     for (const auto& [pair, information] : local_) {
@@ -159,8 +159,8 @@ class Builder {
     }
   }
 
-  /// Neighbours in time, where the file has no measurement that holds them together. What has no
-  /// keyframe has no time of its own: it comes last.
+  /// Adds assumed motions between parts adjacent in time that no measurement connects. Parts
+  /// without keyframes have no time of their own and come last.
   void fill_gaps() {
     std::vector<std::size_t> order;
     for (std::size_t i = 0; i < out_.parts.size(); ++i)
@@ -181,8 +181,8 @@ class Builder {
     return off.translation().norm() > kAnother_m || std::abs(off.theta()) > kAnother_rad;
   }
 
-  /// The other node of a motion whose one node is a submap: a variable of its own, where the motion
-  /// has it, which is fast to the piece of the ground that it is of.
+  /// Adds the other node of a motion with one node in a submap: a variable at the pose by the
+  /// motion, fixed to its piece of the ground.
   void add_ground_node(const Motion& motion) {
     const auto from = find(motion.from);
     const auto to = find(motion.to);
@@ -197,7 +197,7 @@ class Builder {
     if (const auto piece = ground_beside(part, pose))
       tie(*piece, node, Eigen::Vector3d(kFast_m, kFast_m, kFast_rad).asDiagonal());
   }
-  /// The piece of the ground before or behind the part in time that the pose is in, if there is
+  /// The piece of the ground, adjacent to the part in time, that contains the pose, if there is
   /// one.
   std::optional<std::size_t> ground_beside(std::size_t part, const geometry::SE2& pose) const {
     std::optional<std::size_t> best;
@@ -228,7 +228,7 @@ class Builder {
     try {
       return placed_end(map, out_, end, "").part;
     } catch (const ClosureError&) {
-      return std::nullopt;  // What had that end is in the map no more.
+      return std::nullopt;  // The end's place is no longer in the map.
     }
   }
   double step_m(std::size_t a, std::size_t b) const {
@@ -244,18 +244,18 @@ class Builder {
   Eigen::Matrix3d& local(std::size_t low, std::size_t high) {
     return local_.try_emplace({low, high}, Eigen::Matrix3d::Zero()).first->second;
   }
-  /// Keeps it as one of low_T_high.
+  /// Stores it as information on low_T_high.
   void add_local(std::size_t from, std::size_t to, const Eigen::Matrix3d& information) {
     Eigen::Matrix3d turned = information;
     if (from > to) {
-      // Log(high_T_low) is -Ad times that of low_T_high.
+      // Log(high_T_low) is -Ad Log(low_T_high).
       const Eigen::Matrix3d adjoint =
           (out_.graph.poses[from].inverse() * out_.graph.poses[to]).inverse().Adjoint();
       turned = adjoint.transpose() * information * adjoint;
     }
     local(std::min(from, to), std::max(from, to)) += turned;
   }
-  /// A landmark's say on the motion between two of those that observed it.
+  /// Adds a landmark's information on the motion between two parts that observed it.
   void add_shared(const Eigen::Vector2d& at, const std::pair<const std::size_t, View>& a,
                   const std::pair<const std::size_t, View>& b) {
     const geometry::SE2 a_T_b = out_.graph.poses[a.first].inverse() * out_.graph.poses[b.first];
@@ -288,7 +288,7 @@ class Builder {
   std::map<NodeNumber, std::size_t> variable_of_;
   std::set<std::tuple<std::size_t, std::size_t, std::uint64_t>> known_;
   std::set<std::uint64_t> closures_;
-  /// What is measured between two, the earlier one first; right perturbation of that motion.
+  /// Information between two variables, the earlier one first; right perturbation of the motion.
   std::map<std::pair<std::size_t, std::size_t>, Eigen::Matrix3d> local_;
   std::map<std::pair<std::size_t, std::size_t>, int> shared_;
 };

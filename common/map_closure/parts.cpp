@@ -14,12 +14,12 @@ using map_file::StoredMap;
 
 /// Longest piece of the ground, along the path [m].
 constexpr double kLongestPiece_m = 20.0;
-/// A landmark of the ground lies so near to a keyframe of its piece [m], if there is one.
+/// Largest distance of a landmark of the ground from a keyframe of its piece [m], if there is one.
 constexpr double kInSight_m = 40.0;
 
 constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
 
-/// What owns what, by places in the map and in the parts.
+/// The part of each keyframe and landmark, by indices.
 struct Owners {
   std::vector<std::uint32_t> of_keyframe;
   std::vector<std::uint32_t> of_landmark;
@@ -38,7 +38,7 @@ void give_keyframes(const StoredMap& map, std::span<const model::Submap> submaps
   }
 }
 
-/// Where the layers show it. Others than the store may have moved the map since (`map merge`).
+/// The pose in the layers. Other commands may have moved the map since (`map merge`).
 geometry::SE2 shown_pose(const StoredMap& map, const model::Submap& submap, const Part& part) {
   if (part.keyframes.empty()) return submap.map_T_submap;
   const model::KeyframePose& middle = map.keyframes[part.keyframes[part.keyframes.size() / 2]];
@@ -47,7 +47,7 @@ geometry::SE2 shown_pose(const StoredMap& map, const model::Submap& submap, cons
   return middle.map_T_vehicle * inside->map_T_vehicle.inverse();
 }
 
-/// The mapper keeps the keyframes of some: the map's origin, say.
+/// A part may have no keyframes because the mapper kept them, e.g. at the map's origin.
 model::Utime first_time(const StoredMap& map, const Part& part) {
   if (!part.keyframes.empty()) return map.keyframes[part.keyframes.front()].utime;
   const auto nearest = std::ranges::min_element(map.keyframes, {}, [&](const auto& one) {
@@ -56,7 +56,8 @@ model::Utime first_time(const StoredMap& map, const Part& part) {
   return nearest == map.keyframes.end() ? part.utime : nearest->utime;
 }
 
-/// What no submap has, in order of time: a new piece after every gap and every 20 m.
+/// Divides the ground outside of submaps, in order of time: a new piece after every gap and every
+/// 20 m.
 void cut_ground(const StoredMap& map, std::vector<Part>& parts, Owners& owners) {
   double path_m = 0.0;
   bool goes_on = false;
@@ -78,7 +79,7 @@ void cut_ground(const StoredMap& map, std::vector<Part>& parts, Owners& owners) 
   }
 }
 
-/// The part whose keyframe is nearest; of the ground's own, where one is in sight.
+/// The part with the nearest keyframe; a part of the ground if one is near enough.
 std::uint32_t nearest_part(const StoredMap& map, const std::vector<Part>& parts,
                            const Owners& owners, const Eigen::Vector2d& at) {
   constexpr double kFar = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-// A stored map as parts that move as wholes: its submaps, and pieces of the ground beside them.
+// A stored map as rigid parts: its submaps, and pieces of the ground outside of them.
 #pragma once
 
 #include <cstddef>
@@ -12,29 +12,29 @@
 
 namespace understory::map_closure {
 
-/// Why a closure cannot be made; one line for a person.
+/// The reason why a closure cannot be made; one line of text.
 class ClosureError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A submap, or a piece of the path that the mapper held itself when the drive ended.
+/// A submap, or a piece of the path that was in the mapper's memory at the end of the drive.
 struct Part {
-  model::SubmapId submap = 0;  ///< 0: a piece of the ground.
-  /// The mapper held it when the drive ended, ground or a submap that had come back: covariances
-  /// are of the whole map. Those of others are relative to the submap.
+  model::SubmapId submap = 0;  ///< 0 = a piece of the ground.
+  /// It was in the mapper's memory at the end of the drive (ground, or a submap taken back):
+  /// covariances are relative to the map. For other parts they are relative to the submap.
   bool is_held = true;
-  geometry::SE2 map_T_part;  ///< As the layers show it.
-  /// Of its first keyframe, or of the nearest one where it has none [us].
+  geometry::SE2 map_T_part;  ///< As in the layers.
+  /// Stamp of its first keyframe, or of the nearest one if it has none [us].
   model::Utime utime = 0;
-  std::vector<std::uint32_t> keyframes;  ///< Places in StoredMap::keyframes, in order of time.
-  std::vector<std::uint32_t> landmarks;  ///< Places in StoredMap::landmarks.
+  std::vector<std::uint32_t> keyframes;  ///< Indices in StoredMap::keyframes, in order of time.
+  std::vector<std::uint32_t> landmarks;  ///< Indices in StoredMap::landmarks.
 };
 
 /// The parts of a map in order of time; each keyframe and each landmark is in one of them. A piece
-/// of the ground is 20 m of path at most. A landmark of the ground belongs to the piece whose
-/// keyframe is nearest, or, where none is within 40 m, to the part whose is. Throws ClosureError
-/// where the map has no submaps. Cost: landmarks of the ground times keyframes.
+/// of the ground has at most 20 m of path. A landmark of the ground belongs to the piece with the
+/// nearest keyframe or, if none is within 40 m, to the part with the nearest keyframe. Throws
+/// ClosureError where the map has no submaps. Cost: landmarks of the ground times keyframes.
 std::vector<Part> parts_of(const map_file::StoredMap& map, std::span<const model::Submap> submaps);
 
 }  // namespace understory::map_closure
