@@ -18,7 +18,7 @@ namespace {
 
 using Findings = std::vector<std::string>;
 
-/// Pages, indexes and keys, as SQLite checks them.
+/// Checks pages, indexes and keys by SQLite.
 void check_database(const Connection& connection, Findings& findings) {
   Statement pages = connection.prepare("PRAGMA integrity_check");
   while (pages.step()) {
@@ -32,7 +32,7 @@ void check_database(const Connection& connection, Findings& findings) {
                                    keys.text(0), keys.text(2)));
 }
 
-/// Definitions that are not as this version writes them, though they may do no harm.
+/// Finds definitions that differ from this version's, even if they are harmless.
 void check_schema(const Connection& connection, Findings& findings) {
   Statement find = connection.prepare("SELECT sql FROM sqlite_schema WHERE name = ?1");
   for (const SchemaObject& object : schema_objects(schema_version(connection))) {
@@ -45,7 +45,7 @@ void check_schema(const Connection& connection, Findings& findings) {
   }
 }
 
-/// The rows by which other programs find the layers.
+/// Checks the rows by which other programs find the layers.
 void check_registration(const Connection& connection, Findings& findings) {
   if (connection.number(
           "SELECT count(*) FROM gpkg_spatial_ref_sys WHERE srs_id IN (-1, 0, 4326)") != 3)
@@ -68,7 +68,7 @@ void check_registration(const Connection& connection, Findings& findings) {
         "gpkg_spatial_ref_sys: the layers' reference system is not what the maps state");
 }
 
-/// The rectangle that gpkg_contents states has everything in it.
+/// Checks that the rectangle in gpkg_contents contains all features.
 void check_extent(const Connection& connection, const Layer& layer, Findings& findings) {
   const std::int64_t outside = connection.number(fmt::format(
       "SELECT count(*) FROM {0}, gpkg_contents AS c WHERE c.table_name = '{0}' AND NOT coalesce("
@@ -82,7 +82,7 @@ void check_extent(const Connection& connection, const Layer& layer, Findings& fi
                     layer.table, outside));
 }
 
-/// Sides in the index are rounded outwards to 32 bit.
+/// Sides in the index are rounded outwards to 32 bits.
 std::string fits_sql(std::string_view side, std::string_view function, std::string_view sign) {
   return fmt::format("{2}(r.{0} - {1}(geom)) BETWEEN 0 AND 1e-6 * abs({1}(geom)) + 1e-30", side,
                      function, sign);
@@ -121,7 +121,7 @@ void check_maps(const Connection& connection, Findings& findings) {
   }
 }
 
-/// Maps that are what their checksums say, and not what the history leads to.
+/// Finds maps that agree with their checksums but not with the history.
 void check_against_history(const Connection& connection, Findings& findings) {
   const auto recorded = recorded_content(connection);
   if (select_reference(connection) != select_reference(*recorded))
@@ -140,7 +140,7 @@ void check_against_history(const Connection& connection, Findings& findings) {
 
 Findings findings_in(const Connection& connection) {
   Findings findings;
-  // Damage may end one part; the others are looked at all the same.
+  // Damage may end one part of the check; the others still run.
   const auto part = [&](const std::function<void()>& check) {
     try {
       check();

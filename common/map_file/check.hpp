@@ -1,4 +1,4 @@
-// What is wrong with a map file.
+// Finds faults of a map file.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace understory::map_file {
 
-/// A line for each thing that is wrong; see MapFile::check. Nothing is thrown for damage.
+/// One line for each fault; see MapFile::check. Damage causes no exception.
 std::vector<std::string> findings_in(const Connection& connection);
 
 }  // namespace understory::map_file

@@ -19,7 +19,7 @@ std::string numbers_in(const std::vector<MapSummary>& maps) {
 
 std::uint32_t chosen_map(const MapFile& file, int map_id) {
   const std::vector<MapSummary> all = file.maps();
-  // Merged maps leave trajectories of their own behind: maps without landmarks.
+  // Merging leaves trajectories as maps without landmarks.
   const auto has_landmarks = [](const auto& map) { return map.trunks + map.corners > 0; };
   const auto only = std::ranges::find_if(all, has_landmarks);
   if (map_id == 0 && std::ranges::count_if(all, has_landmarks) == 1) return only->map_id;

@@ -1,4 +1,4 @@
-// Which of a file's maps is meant.
+// Selects one of a file's maps.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,9 @@
 
 namespace understory::map_file {
 
-/// The number of the map that a drive begins with. `map_id` 0: the only one that has landmarks.
-/// Throws std::runtime_error, which names the file and the maps that it has, where that cannot be
-/// told or is not there.
+/// The number of the map with which a drive begins. `map_id` 0: the only map with landmarks. Throws
+/// std::runtime_error, with the file and its maps, where the choice is ambiguous or the map is
+/// missing.
 std::uint32_t chosen_map(const MapFile& file, int map_id);
 
 }  // namespace understory::map_file

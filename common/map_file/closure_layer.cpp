@@ -12,7 +12,8 @@ namespace {
 /// One end of a closure on the map.
 struct ClosureEnd {
   Eigen::Vector2d place_m;
-  std::uint64_t sequence = 0;  ///< Of its keyframe, or of that nearest to the submap's origin.
+  /// Sequence of its keyframe, or of the keyframe nearest to the submap's origin.
+  std::uint64_t sequence = 0;
 };
 
 std::optional<ClosureEnd> end_at_submap(const Connection& connection, const SubmapKey& key) {
@@ -105,7 +106,7 @@ void redraw_closures(const Connection& connection) {
     const auto map_id = static_cast<std::uint32_t>(map_number);
     const auto from = end_of(connection, map_id, row.count(2), row.integer(3));
     const auto to = end_of(connection, map_id, row.count(4), row.integer(5));
-    // An end may be in a submap that is not here yet.
+    // An end may be in a submap that is not in the file yet.
     if (!from || !to) continue;
     rows.put(static_cast<std::int64_t>(landmark_id(map_id, row.count(0))), map_id,
              {from->sequence, to->sequence, from->place_m, to->place_m});

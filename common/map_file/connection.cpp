@@ -55,7 +55,7 @@ Diagnosis diagnosis_of(int code, int system_error, const std::string& message) {
   }
 }
 
-/// What sqlite.org/security.html advises for files of others; our statements need no more.
+/// Limits from sqlite.org/security.html for foreign files; our statements need no more.
 void set_limits(sqlite3* handle) {
   sqlite3_limit(handle, SQLITE_LIMIT_SQL_LENGTH, 1'000'000);
   sqlite3_limit(handle, SQLITE_LIMIT_EXPR_DEPTH, 100);
@@ -72,8 +72,8 @@ void set_up(sqlite3* handle) {
   sqlite3_busy_timeout(handle, 0);
   int ignored = 0;
   sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, &ignored);
-  // SQLite 3.40 lets triggers reach the R*Tree only where the schema is trusted, which it is after
-  // a look at it.
+  // SQLite 3.40 lets triggers access the R*Tree only if the schema is trusted; it is trusted after
+  // its check.
   sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, &ignored);
   sqlite3_exec(handle, "PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0", nullptr, nullptr,
                nullptr);
@@ -169,7 +169,7 @@ void Statement::put(int index, std::nullopt_t /*nothing*/) {
 Connection::Connection(const std::filesystem::path& place, Access access,
                        std::filesystem::path file)
     : file_(std::move(file)) {
-  // An absolute path: a name that begins with "file:" would be taken for a URI.
+  // An absolute path: SQLite would treat a name that begins with "file:" as a URI.
   open(std::filesystem::absolute(place).string(),
        access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE);
   set_up(handle_.get());
@@ -226,7 +226,7 @@ void Connection::fail() const {
   // The low byte of an extended code is the kind.
   const int code = sqlite3_extended_errcode(handle_.get()) & 0xFF;
   if (code == SQLITE_NOMEM) throw std::bad_alloc();
-  // The SQL of a damaged schema comes with its line feeds.
+  // The SQL of a damaged schema contains line feeds.
   std::string message = sqlite3_errmsg(handle_.get());
   std::ranges::replace(message, '\n', ' ');
   const Diagnosis found = diagnosis_of(code, sqlite3_system_errno(handle_.get()), message);

@@ -1,4 +1,4 @@
-// SQLite as far as this folder uses it: one open file, and statements on it.
+// Wrapper of SQLite for this folder: one open file, and statements on it.
 #pragma once
 
 #include <cstdint>
@@ -16,33 +16,33 @@ struct sqlite3_stmt;
 
 namespace understory::map_file {
 
-/// What a file is opened for.
+/// Access to an open file.
 enum class Access { kRead, kWrite };
 
-/// Bytes of a column; they live until the statement steps on.
+/// Bytes of a column; valid until the next step().
 using Blob = std::span<const std::uint8_t>;
 
-/// Releases what SQLite gave.
+/// Deleter of statements.
 struct StatementCloser {
   /// Ends a statement; its errors were reported by step().
   void operator()(sqlite3_stmt* statement) const;
 };
-/// Releases what SQLite gave.
+/// Deleter of connections.
 struct ConnectionCloser {
-  /// Closes a file; statements on it must be gone.
+  /// Closes a file; its statements must be destroyed before.
   void operator()(sqlite3* connection) const;
 };
 
 class Connection;
 
-/// One SQL statement. All errors are MapFileError, with the file in front.
+/// One SQL statement. Errors are thrown as MapFileError, which begins with the file.
 class Statement {
  public:
-  /// For Connection::prepare.
+  /// Called by Connection::prepare.
   Statement(const Connection& connection, sqlite3_stmt* statement)
       : connection_(&connection), statement_(statement) {}
 
-  /// Values for ?1, ?2, ..., of a statement that then starts anew: std::int64_t, double,
+  /// Sets the values ?1, ?2, ... and restarts the statement: std::int64_t, double,
   /// std::string_view, Blob, or an optional of one of them (none = NULL). Texts and bytes must live
   /// until the last step.
   template <class... Values>
@@ -52,27 +52,27 @@ class Statement {
     (put(++index, values), ...);
     return *this;
   }
-  /// On to the next row; false = there is none.
+  /// Moves to the next row; false = no more rows.
   bool step();
-  /// To the end, for statements that give no rows.
+  /// Runs a statement without result rows.
   void run() {
     while (step()) {
     }
   }
 
-  /// Whether the column of the row is NULL. Columns count from 0.
+  /// Whether the column of the row is NULL. Columns are numbered from 0.
   bool is_null(int column) const;
-  /// A whole number. Fault::kDamaged where the column has something else.
+  /// A whole number. Fault::kDamaged where the column has another type.
   std::int64_t integer(int column) const;
-  /// The same, which must not be negative.
+  /// The same for a number that must not be negative.
   std::uint64_t count(int column) const;
-  /// A number. Fault::kDamaged where the column has something else.
+  /// A number. Fault::kDamaged where the column has another type.
   double real(int column) const;
-  /// A text; NULL is empty. Fault::kDamaged where the column has something else.
+  /// A text; NULL is empty. Fault::kDamaged where the column has another type.
   std::string text(int column) const;
-  /// Bytes. Fault::kDamaged where the column has something else.
+  /// Bytes. Fault::kDamaged where the column has another type.
   Blob blob(int column) const;
-  /// SQLite's statement, for what is not covered here.
+  /// SQLite's statement, for functions not covered here.
   sqlite3_stmt* handle() const { return statement_.get(); }
 
  private:
@@ -92,40 +92,40 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, StatementCloser> statement_;
 };
 
-/// An open database. Statements refer to it: it stays where it is.
+/// An open database. Not movable, because statements refer to it.
 class Connection {
  public:
-  /// Opens the existing file `place`, which errors call `file`; nothing is read yet. The schema is
-  /// not trusted, and statements in which triggers or views of others would run fail
-  /// (schema_guard.hpp). Throws MapFileError.
+  /// Opens the existing file `place`, named `file` in errors; reads nothing yet. The schema is not
+  /// trusted, and statements that would run foreign triggers or views fail (schema_guard.hpp).
+  /// Throws MapFileError.
   Connection(const std::filesystem::path& place, Access access, std::filesystem::path file);
   /// An empty database in memory. Throws MapFileError.
   explicit Connection(std::filesystem::path file);
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  /// A statement from SQL.
+  /// Prepares a statement.
   Statement prepare(std::string_view sql) const;
-  /// Runs statements that give nothing.
+  /// Runs statements without results.
   void execute(const std::string& sql) const;
   /// First column of the first row, a whole number.
   std::int64_t number(std::string_view sql) const;
   /// First column of the first row; empty where there is no row.
   std::string text(std::string_view sql) const;
 
-  /// Whether triggers of the schema reach virtual tables, as those of the layers do; for a schema
-  /// that is ours only.
+  /// Sets whether triggers of the schema may access virtual tables, as those of the layers do; only
+  /// for a schema that is entirely ours.
   void trust_schema(bool is_trusted) const;
-  /// As trust_schema() was called last.
+  /// Latest value of trust_schema().
   bool is_schema_trusted() const;
 
   /// The file's name for people.
   const std::filesystem::path& file() const { return file_; }
-  /// SQLite's connection, for what is not covered here.
+  /// SQLite's connection, for functions not covered here.
   sqlite3* handle() const { return handle_.get(); }
-  /// Throws the fault that SQLite's last error is.
+  /// Throws the fault of SQLite's last error.
   [[noreturn]] void fail() const;
-  /// Throws Fault::kDamaged with what is wrong.
+  /// Throws Fault::kDamaged with this text.
   [[noreturn]] void damaged(const std::string& what) const;
 
  private:
@@ -138,12 +138,12 @@ class Connection {
 /// BEGIN IMMEDIATE; rolled back unless committed.
 class Transaction {
  public:
-  /// Begins. Throws MapFileError where others are writing.
+  /// Begins. Throws MapFileError where another process is writing.
   explicit Transaction(const Connection& connection);
   ~Transaction();
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
-  /// All of it is in the file, and on the device, when this returns.
+  /// On return the transaction is in the file and on the device.
   void commit();
 
  private:

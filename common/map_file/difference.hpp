@@ -1,4 +1,4 @@
-// What two maps of one frame have not in common.
+// Differences between two maps of one frame.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace understory::map_file {
 
-/// A landmark that both maps have, at different places.
+/// A landmark of both maps, at different positions.
 struct MovedLandmark {
   model::LandmarkId id = 0;
   double distance_m = 0.0;
@@ -17,41 +17,42 @@ struct MovedLandmark {
   double chi2 = 0.0;
 };
 
-/// A landmark that both maps have, which left use or came back to it, or of which another
-/// probability is known. Without a state of existence it is in use.
+/// A landmark of both maps whose state of use or probability differs. Without a state of existence
+/// it is in use.
 struct ExistenceChange {
   model::LandmarkId id = 0;
   bool was_in_use = true;
   bool is_in_use = true;
-  std::optional<double> probability_before;  ///< That it exists; none where the map does not say.
+  std::optional<double>
+      probability_before;  ///< Probability of existence; none if the map has none.
   std::optional<double> probability_after;
 };
 
-/// From one map to another.
+/// Changes from one map to another.
 struct MapDifference {
   std::vector<model::LandmarkId> added;
   std::vector<model::LandmarkId> removed;
-  std::vector<MovedLandmark> moved;        ///< Those beyond the quantile, in order of id.
+  std::vector<MovedLandmark> moved;        ///< Landmarks beyond the quantile, in order of id.
   std::size_t kept = 0;                    ///< In both, within the quantile.
   std::vector<ExistenceChange> existence;  ///< In order of id.
 };
 
-/// When a landmark has moved, and when its existence has changed.
+/// Limits for a move and a change of existence.
 struct DifferenceLimits {
-  double quantile = 0.99;  ///< Of chi-squared; what lies beyond it has moved. Within 0 and 1.
+  double quantile = 0.99;  ///< Quantile of chi-squared, 0 to 1; a landmark beyond it has moved.
   /// Standard deviation in x and in y of a landmark without covariance [m]; 0: any move counts.
   double unknown_sigma_m = 0.0;
-  /// Of the probability that a landmark exists, where both maps know it: a larger one is told.
+  /// Changes of the probability of existence above this are listed, if both maps have one.
   double probability_change = 0.1;
 };
 
-/// The value that a chi-squared variable with two degrees of freedom exceeds with probability
-/// 1 - `quantile`, which lies within 0 and 1.
+/// The value that a chi-squared variable with two degrees of freedom exceeds with probability 1 -
+/// `quantile`, between 0 and 1.
 double chi2_of_quantile(double quantile);
 
-/// What changes from `before` to `after`. A landmark is the same one where it has the same id. The
-/// frames are taken to be the same: nothing is aligned. The errors of both estimates are taken to
-/// be independent; of two states of one map they are not, and moves are then understated. O(size).
+/// The changes from `before` to `after`. Landmarks are matched by id. Both maps must have one
+/// frame; they are not aligned. The errors of both estimates are assumed independent; for two
+/// states of one map they are not, and moves are then underestimated. O(size).
 MapDifference difference(const StoredMap& before, const StoredMap& after,
                          const DifferenceLimits& limits);
 

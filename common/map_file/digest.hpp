@@ -11,30 +11,30 @@ struct evp_md_ctx_st;
 
 namespace understory::map_file {
 
-/// Releases what libcrypto gave.
+/// Deleter of libcrypto's contexts.
 struct DigestCloser {
   /// Ends a digest.
   void operator()(evp_md_ctx_st* context) const;
 };
 
-/// One digest: what is added, in order, then its 64 hexadecimal digits. Values are told apart by
-/// their type and length, so that no two sequences of values are the same bytes.
+/// One digest over values in order, as 64 hexadecimal digits. Type and length of each value are
+/// included, so that different sequences of values never have equal bytes.
 class Digest {
  public:
-  /// Of nothing. Throws std::bad_alloc.
+  /// An empty digest. Throws std::bad_alloc.
   Digest();
 
-  /// A whole number.
+  /// Adds an integer.
   void add(std::int64_t value);
-  /// A number, bit by bit.
+  /// Adds a number, bit by bit.
   void add(double value);
-  /// A text.
+  /// Adds a text.
   void add(std::string_view value);
-  /// Bytes.
+  /// Adds bytes.
   void add(std::span<const std::uint8_t> value);
-  /// A value that is not there.
+  /// Adds a missing value.
   void add_null();
-  /// The digest; nothing can be added behind it.
+  /// The digest; nothing can be added afterwards.
   std::string take();
 
  private:

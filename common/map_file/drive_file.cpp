@@ -15,7 +15,7 @@
 namespace understory::map_file {
 namespace {
 
-/// Submaps that are drawn in one transaction where nobody waits.
+/// Submaps drawn in one transaction at sealing.
 constexpr std::size_t kDrawnTogether = 50;
 
 std::string meta(const Connection& connection, std::string_view key) {
@@ -29,7 +29,7 @@ void set_meta(const Connection& connection, std::string_view key, std::int64_t v
       .run();
 }
 
-/// A whole number; none where there is none.
+/// Reads an integer; none where there is none.
 std::optional<std::int64_t> number_in(const std::string& text) {
   try {
     std::size_t end = 0;
@@ -77,7 +77,7 @@ void seal_drive(const Connection& connection) {
     transaction.commit();
   }
 
-  // What other programs changed in between is not told apart.
+  // Changes by other programs in between are not recorded separately.
   const auto recorded = recorded_content(connection);
   if (!is_as_recorded(connection, *recorded))
     record_foreign_edits(connection, *recorded, note_of_drive(connection), false);
@@ -139,7 +139,7 @@ std::uint32_t DriveFile::highest_map() const {
   return ids.empty() ? 0 : ids.back();
 }
 
-/// The beginning of every transaction that changes what the layers show.
+/// Begins a transaction that changes the layers.
 void DriveFile::begin(std::uint32_t map_id, model::Utime utime) {
   if (map_id < 1 || map_id > kLastMapId)
     throw MapFileError(Fault::kRefused,

@@ -104,7 +104,7 @@ void settle_existence(const Connection& connection) {
   connection.execute(
       "UPDATE existence_states AS s SET map_id = l.map_id FROM landmarks AS l "
       "WHERE l.landmark_id = s.landmark_id AND l.map_id != s.map_id");
-  // A map that took over its first landmark with a state goes on with what was learned last.
+  // A map that received its first landmark with a state continues with the latest learned values.
   connection.execute(
       "INSERT OR IGNORE INTO existence_models "
       "SELECT DISTINCT s.map_id, m.utime, m.model FROM existence_states AS s, "

@@ -1,4 +1,4 @@
-// The tables that keep what the existence tracker goes on with; schema version 3.
+// The tables of the existence tracker's saved state; schema version 3.
 #pragma once
 
 #include <vector>
@@ -8,11 +8,11 @@
 
 namespace understory::map_file {
 
-/// The tables. They are content of maps: the history and the checksums have them.
+/// The tables. They are content of maps, included in the history and the checksums.
 std::vector<SchemaObject> existence_objects();
 /// Lists the tables among the GeoPackage's extensions.
 void register_existence_tables(const Connection& connection);
-/// Whether the database has them: files of versions 1 and 2 that are open to read have not.
+/// Whether the database has them: files of versions 1 and 2 opened for reading lack them.
 bool has_existence_tables(const Connection& connection);
 
 }  // namespace understory::map_file

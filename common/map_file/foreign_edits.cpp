@@ -14,7 +14,7 @@ namespace {
 
 constexpr const char* kRecorded = "recorded";
 
-/// A copy of a database in memory beside the file's own, while it lives.
+/// Attaches a copy of an in-memory database to the file's connection during its lifetime.
 class Attached {
  public:
   Attached(const Connection& connection, const Connection& other) : connection_(connection) {
@@ -22,7 +22,7 @@ class Attached {
     sqlite3_int64 size = 0;
     unsigned char* const bytes = sqlite3_serialize(other.handle(), "main", &size, 0);
     if (bytes == nullptr) throw std::bad_alloc();
-    // It owns the bytes from here on, also where it fails.
+    // SQLite owns the bytes from here on, also on failure.
     const int result = sqlite3_deserialize(connection_.handle(), kRecorded, bytes, size, size,
                                            SQLITE_DESERIALIZE_FREEONCLOSE);
     if (result != SQLITE_OK) connection_.fail();
@@ -69,7 +69,7 @@ std::uint64_t record_foreign_edits(const Connection& connection, const Connectio
                                    const ChangeNote& note, bool must_be_maps) {
   const Attached attached(connection, recorded);
   Transaction transaction(connection);
-  // Who deletes a landmark knows nothing of its state.
+  // Programs that delete a landmark do not delete its state.
   drop_lost_states(connection);
   std::uint64_t number = 0;
   {

@@ -1,4 +1,4 @@
-// What other programs changed in a map file: in no history, and in no checksum.
+// Changes by other programs in a map file, which are in no history and no checksum.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace understory::map_file {
 
-/// Whether every map is what the history says, and what its checksum says. Fault::kDamaged where
-/// the history itself is damaged. O(all changes).
+/// Whether every map agrees with the history and with its checksum. Fault::kDamaged where the
+/// history itself is damaged. O(all changes).
 bool is_as_recorded(const Connection& connection, const Connection& recorded);
 
-/// Writes what others changed into the history as a change of its own, whose number it gives, so
-/// that it can be taken back. Rows stay as they are; each map gets the checksum of what it is now,
-/// unless it cannot be read as one: then Fault::kDamaged with `must_be_maps`, else it stays as it
-/// is. The database `recorded` is recorded_content(). In no transaction: it is one.
+/// Records foreign changes in the history as a separate change, which can be reverted; returns its
+/// number. Rows stay unchanged; each map gets the checksum of its present content. If a map is
+/// unreadable: Fault::kDamaged with `must_be_maps`, else its checksum stays. The database
+/// `recorded` is recorded_content(). This is a transaction; call it outside of one.
 std::uint64_t record_foreign_edits(const Connection& connection, const Connection& recorded,
                                    const ChangeNote& note, bool must_be_maps);
 

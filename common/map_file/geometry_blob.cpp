@@ -32,7 +32,7 @@ class BlobWriter {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Reads on while there are bytes; what is beyond them is none.
+/// Reads values while there are bytes; none beyond the end.
 class BlobReader {
  public:
   explicit BlobReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -72,7 +72,7 @@ class BlobReader {
   bool is_little_ = true;
 };
 
-/// Past the header, to the well-known binary; false where there is none.
+/// Skips the header up to the well-known binary; false where there is none.
 bool skip_header(BlobReader& reader) {
   const auto g = reader.next<std::uint8_t>();
   const auto p = reader.next<std::uint8_t>();
@@ -85,7 +85,7 @@ bool skip_header(BlobReader& reader) {
   return reader.skip(sizeof(std::int32_t) + kEnvelopeBytes[envelope]);
 }
 
-/// The corners of a polygon's one ring, which is closed in the bytes.
+/// The corners of a polygon's single ring, which repeats its first corner in the bytes.
 std::optional<std::vector<Eigen::Vector2d>> ring(BlobReader& reader) {
   if (reader.next<std::uint32_t>() != 1U) return std::nullopt;
   auto points = reader.points(reader.next<std::uint32_t>().value_or(0));

@@ -22,7 +22,7 @@ double side_of(const Box& box, int side) {
   return side % 2 == 0 ? corner.x() : corner.y();
 }
 
-/// What SQLite calls: nothing may be thrown through it.
+/// Called by SQLite: no exception may pass through it.
 template <class Work>
 void guarded_in_sqlite(sqlite3_context* context, const Work& work) noexcept {
   try {
@@ -49,7 +49,7 @@ void sql_is_empty(sqlite3_context* context, int /*count*/, sqlite3_value** value
 using SqlFunction = void (*)(sqlite3_context*, int, sqlite3_value**);
 
 void add_function(sqlite3* connection, const char* name, SqlFunction function) {
-  // Innocuous: triggers of a schema that is not trusted may call them.
+  // Innocuous, so that triggers of an untrusted schema may call them.
   constexpr int kFlags = SQLITE_UTF8 | SQLITE_DETERMINISTIC | SQLITE_INNOCUOUS;
   if (sqlite3_create_function_v2(connection, name, 1, kFlags, nullptr, function, nullptr, nullptr,
                                  nullptr) != SQLITE_OK)

@@ -1,4 +1,4 @@
-// The session extension's functions are declared on request.
+// The session extension's functions need this macro.
 #ifndef SQLITE_ENABLE_SESSION
 #define SQLITE_ENABLE_SESSION
 #endif
@@ -23,7 +23,7 @@
 namespace understory::map_file {
 namespace {
 
-/// zlib packs at most so much into one byte: more is no honest length.
+/// zlib packs at most this many bytes into one; a larger stated length is damage.
 constexpr std::uint64_t kMostPacked = 1040;
 constexpr const char* kMain = "main";
 
@@ -55,7 +55,7 @@ std::vector<std::uint8_t> packed(const Changeset& changeset) {
   return bytes;
 }
 
-/// Fault::kDamaged where the bytes are not `size` packed ones.
+/// Unpacks bytes. Fault::kDamaged where the result has not `size` bytes.
 std::vector<std::uint8_t> unpacked(const Connection& connection, Blob bytes, std::uint64_t size) {
   const std::uint64_t most =
       std::min<std::uint64_t>(kMostPacked * (bytes.size() + 1), std::numeric_limits<int>::max());
@@ -99,16 +99,16 @@ bool is_content(std::string_view table) {
   return std::ranges::find(kContentTables, table) != kContentTables.end();
 }
 
-/// Which tables a change is applied to.
+/// Filter of the tables to which a change is applied.
 using TableFilter = int (*)(void* context, const char* table);
 int is_content_table(void* /*context*/, const char* table) { return is_content(table) ? 1 : 0; }
-/// Another program's tables are not touched, whatever a change lists.
+/// Tables of other programs are never changed, whatever a change lists.
 int is_recorded_table(void* /*context*/, const char* table) {
   const bool is_placement = std::ranges::find(kPlacementTables, table) != kPlacementTables.end();
   return is_placement || is_content(table) ? 1 : 0;
 }
 
-/// The rows must be what the change left.
+/// The rows must equal the result of the change.
 int on_conflict(void* /*context*/, int /*kind*/, sqlite3_changeset_iter* /*change*/) {
   return SQLITE_CHANGESET_ABORT;
 }
@@ -133,7 +133,7 @@ void apply(const Connection& connection, void* changeset, int size, std::uint64_
   connection.fail();
 }
 
-/// Of a row of kSelectChanges. Fault::kDamaged where it is not what was recorded.
+/// The change set in a row of kSelectChanges. Fault::kDamaged where it is damaged.
 std::vector<std::uint8_t> changeset_in(const Connection& connection, const Statement& row) {
   if (!is_as_written(row))
     connection.damaged(fmt::format("change {} is not what was recorded", row.count(0)));
@@ -218,7 +218,7 @@ std::unique_ptr<Connection> recorded_content(const Connection& connection) {
       connection.prepare("SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?1");
   for (const SchemaObject& object : schema_objects()) {
     if (!is_content(object.name)) continue;
-    // Changes since then have the columns that another program has added.
+    // Later changes include the columns added by another program.
     const bool is_there = made.bind(std::string_view(object.name)).step();
     const std::string theirs = is_there ? made.text(0) : std::string();
     recorded->execute(adds_plain_columns(object.sql, theirs) ? theirs : object.sql);

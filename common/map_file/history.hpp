@@ -1,4 +1,4 @@
-// What was changed in a map file: each change with the rows as they were before.
+// The history of a map file: each change with the old rows.
 #pragma once
 
 #include <cstdint>
@@ -13,37 +13,37 @@ struct sqlite3_session;
 
 namespace understory::map_file {
 
-/// Why a change is made; all texts for people.
+/// Description of a change; all texts are for people.
 struct ChangeNote {
-  model::Utime utime = 0;  ///< When [us since the epoch].
-  std::string command;     ///< What made it, e.g. "understory map import".
-  std::string source;      ///< What it was made from, e.g. a file's name.
-  std::string text;        ///< What it does.
+  model::Utime utime = 0;  ///< Time of the change [us since the epoch].
+  std::string command;     ///< The command, e.g. "understory map import".
+  std::string source;      ///< The source, e.g. a file's name.
+  std::string text;        ///< The effect of the change.
 };
 
 /// One change of a file.
 struct Change {
-  std::uint64_t number = 0;  ///< From 1, without holes.
+  std::uint64_t number = 0;  ///< From 1, without gaps.
   ChangeNote note;
-  std::uint64_t bytes = 0;  ///< Of its rows before and after, as they are in the file.
+  std::uint64_t bytes = 0;  ///< Size of its old and new rows in the file.
 };
 
-/// Releases what SQLite gave.
+/// Deleter of sessions.
 struct SessionCloser {
   /// Ends a session.
   void operator()(sqlite3_session* session) const;
 };
 
-/// Records what is changed in the content tables, and of where submaps are (submap_tables.hpp),
-/// from its making on, by SQLite's session extension.
+/// Records changes of the content tables and of the submaps' places (submap_tables.hpp) during its
+/// lifetime, by SQLite's session extension.
 class Recording {
  public:
-  /// Begins. The connection's transaction has begun and outlives it.
+  /// Begins. The connection's transaction must have begun and outlive it.
   explicit Recording(const Connection& connection);
-  /// Takes as changed what makes the content tables of the attached database `schema` those of the
-  /// file. Nothing was changed yet. Fault::kDamaged where tables have not the same columns.
+  /// Records the difference from the content tables of the attached database `schema` to those of
+  /// the file. Call it before any change. Fault::kDamaged where tables have different columns.
   void add_difference(const std::string& schema);
-  /// Writes the change into the history and gives its number. A change of nothing is one, too.
+  /// Writes the change into the history and returns its number. An empty change is recorded too.
   std::uint64_t write(const ChangeNote& note);
 
  private:
@@ -55,14 +55,14 @@ class Recording {
 std::uint64_t latest_change(const Connection& connection);
 /// All changes, in order of number.
 std::vector<Change> changes_in(const Connection& connection);
-/// Takes one change back: its rows become what they were before it, where submaps are among them.
-/// All later ones must have been taken back. Fault::kDamaged where the rows are not what the change
-/// left, or the change is not what was recorded; the transaction is then to be rolled back.
+/// Reverts one change: restores its old rows, places of submaps included. All later changes must
+/// have been reverted. Fault::kDamaged where the rows differ from the result of the change, or the
+/// record is damaged; the caller must then roll back the transaction.
 void undo(const Connection& connection, std::uint64_t number);
-/// The content tables as the history says that they are, in memory: all changes, one after the
-/// other. Fault::kDamaged where a change is not what was recorded. O(all changes).
+/// The content tables by the history, in memory: all changes are applied in order. Fault::kDamaged
+/// where a record is damaged. O(all changes).
 std::unique_ptr<Connection> recorded_content(const Connection& connection);
-/// What is wrong with the record of the changes: numbers missing, one that is not what was written.
+/// Faults of the recorded changes: missing numbers, damaged records.
 std::vector<std::string> faults_of_history(const Connection& connection);
 
 }  // namespace understory::map_file

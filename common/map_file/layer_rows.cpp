@@ -6,7 +6,7 @@
 namespace understory::map_file {
 namespace {
 
-/// A variance or covariance; none where the whole matrix was not computed.
+/// A variance or covariance; none if the matrix was not computed.
 using Entry = std::optional<double>;
 
 std::int64_t signed_of(std::uint64_t value) { return static_cast<std::int64_t>(value); }

@@ -9,19 +9,20 @@
 
 namespace understory::map_file {
 
-/// landmarks.kind.
+/// Values of landmarks.kind.
 inline constexpr std::string_view kTrunkText = "trunk";
 inline constexpr std::string_view kCornerText = "corner";
 
-/// What happens where a landmark of the same id is there, whatever map it is of.
+/// Treatment of an existing landmark with the same id, in any map.
 enum class SameLandmark : std::uint8_t { kRefused, kReplaced };
 
 /// Writes landmarks.
 class LandmarkRows {
  public:
-  /// `connection` outlives it.
+  /// `connection` must outlive it.
   LandmarkRows(const Connection& connection, SameLandmark same);
-  /// The map's row is there. Fault::kRefused where the landmark is and may not be replaced.
+  /// Precondition: the map's row exists. Fault::kRefused where the landmark exists and may not be
+  /// replaced.
   void put(std::uint32_t map_id, const StoredLandmark& landmark);
 
  private:
@@ -32,9 +33,9 @@ class LandmarkRows {
 /// Writes keyframes; one of the same number is replaced.
 class KeyframeRows {
  public:
-  /// `connection` outlives it.
+  /// `connection` must outlive it.
   explicit KeyframeRows(const Connection& connection);
-  /// The map's row is there. Numbers grow with time.
+  /// Precondition: the map's row exists. Numbers grow with time.
   void put(std::int64_t number, std::uint32_t map_id, const model::KeyframePose& pose);
 
  private:
@@ -45,9 +46,9 @@ class KeyframeRows {
 /// Writes borders of submaps; one of the same number is replaced.
 class BorderRows {
  public:
-  /// `connection` outlives it.
+  /// `connection` must outlive it.
   explicit BorderRows(const Connection& connection);
-  /// The map's row is there.
+  /// Precondition: the map's row exists.
   void put(std::int64_t number, std::uint32_t map_id, const SubmapBorder& border);
 
  private:
@@ -58,9 +59,9 @@ class BorderRows {
 /// Writes loop closures; one of the same number is replaced.
 class LoopRows {
  public:
-  /// `connection` outlives it.
+  /// `connection` must outlive it.
   explicit LoopRows(const Connection& connection);
-  /// The map's row is there.
+  /// Precondition: the map's row exists.
   void put(std::int64_t number, std::uint32_t map_id, const LoopClosure& loop);
 
  private:

@@ -16,7 +16,7 @@ struct ContentQuery {
   std::string_view sql;
 };
 
-/// Columns are named: one that another program has added to a layer does not count.
+/// Columns are listed by name, so columns added by other programs are not included.
 constexpr std::array<ContentQuery, 5> kContentQueries{{
     {"understory_maps",
      "SELECT map_id, name, created_utime, origin FROM understory_maps WHERE map_id = ?1"},
@@ -34,7 +34,7 @@ constexpr std::array<ContentQuery, 5> kContentQueries{{
      "SELECT fid, geom, from_sequence, to_sequence FROM loop_closures WHERE map_id = ?1 "
      "ORDER BY fid"},
 }};
-/// A table that has nothing of the map is not counted: sums from before these tables stay valid.
+/// A table without rows of the map is not included, so sums from before these tables stay valid.
 constexpr std::array<ContentQuery, 2> kExistenceQueries{{
     {"existence_models", "SELECT utime, model FROM existence_models WHERE map_id = ?1"},
     {"existence_states",

@@ -44,7 +44,7 @@ MapSummary summary_of(const Connection& connection, std::uint32_t map_id) {
           existence.unused};
 }
 
-/// The transaction that a change is: `work` changes rows, which are recorded.
+/// Runs a change as one transaction: `work` changes rows, which are recorded.
 template <class Work>
 std::uint64_t changed(const Connection& connection, const ChangeNote& note, const Work& work) {
   Transaction transaction(connection);
@@ -61,7 +61,7 @@ std::uint64_t changed(const Connection& connection, const ChangeNote& note, cons
 
 void replace_maps(const Connection& connection, std::span<const StoredMap> maps) {
   for (const StoredMap& map : maps) {
-    // What another program changed would be in the history as if it had been ours.
+    // Otherwise changes by another program would be recorded as ours.
     if (!stated_checksum(connection, map.map_id).empty()) verify_checksum(connection, map.map_id);
     delete_map(connection, map.map_id);
     insert_map(connection, map);
@@ -86,7 +86,7 @@ void place(const Connection& connection, std::uint32_t map_id, const Placement& 
 /// Files of version 1 have no submaps.
 bool has_submaps(const Connection& connection) { return schema_version(connection) >= 2; }
 
-/// A drive whose store was killed is brought to its end first.
+/// A drive whose store was killed is sealed first.
 std::unique_ptr<Connection> opened(const std::filesystem::path& file, Access access) {
   if (access == Access::kRead) {
     auto connection = open_to_read(file);

@@ -1,4 +1,4 @@
-// A file that holds maps: an SQLite database that is at the same time a GeoPackage.
+// A map file: an SQLite database that is also a GeoPackage.
 #pragma once
 
 #include <cstdint>
@@ -17,83 +17,84 @@
 
 namespace understory::map_file {
 
-/// What a file has of one map, without its rows.
+/// Summary of one map in a file.
 struct MapSummary {
   std::uint32_t map_id = 0;
   std::string name;
   model::Utime created_utime = 0;
   std::string origin;
   std::string
-      checksum;  ///< SHA-256 of its content as the file states it; equal content, equal sum.
+      checksum;  ///< SHA-256 of its content, as stated in the file; equal content has equal sums.
   std::uint64_t trunks = 0;
   std::uint64_t corners = 0;
   std::uint64_t keyframes = 0;
   std::uint64_t submap_borders = 0;
   std::uint64_t loop_closures = 0;
   std::uint64_t existence_states = 0;  ///< Landmarks with a state of existence ...
-  std::uint64_t not_in_use = 0;        ///< ... and those of them that are taken for gone.
+  std::uint64_t not_in_use = 0;        ///< ... and those of them judged as removed.
 };
 
-/// Where submaps of one map are, and closures that are new in it.
+/// New poses of submaps of one map, and its new closures.
 struct Placement {
   std::vector<model::SubmapPose> submaps;
-  std::vector<model::LoopClosure> closures;  ///< Each with a number that the map does not have.
+  std::vector<model::LoopClosure> closures;  ///< Each has a new number in the map.
 };
 
-/// An open map file. Everything throws MapFileError, which names the file.
+/// An open map file. All functions throw MapFileError with the file name.
 ///
-/// Open for reading it shows one state, whatever others do. Open for writing nobody else can read
-/// or write it; each change is one transaction, on the device when the call returns, and recorded
-/// with the rows as they were before. Killed at any moment the file has every change that was
-/// finished. Closed it is a single file in SQLite's plain format.
+/// Opened for reading it shows one constant state. Opened for writing it is locked for others; each
+/// change is one transaction, on the device when the call returns, and recorded with the old rows.
+/// If the process is killed, the file has every finished change. After closing it is a single file
+/// in SQLite's plain format.
 class MapFile {
  public:
-  /// Opens what is there. Where a process was killed while it wrote, its last finished change is
-  /// brought into the file first, if that can be written. A drive's file (drive_file.hpp) whose
-  /// store was killed is sealed first. O(1) but for that.
+  /// Opens an existing file. If a writing process was killed, its last finished change is first
+  /// brought into the file, if that is writable. A drive's file (drive_file.hpp) whose store was
+  /// killed is sealed first. O(1) except for these cases.
   MapFile(const std::filesystem::path& file, Access access);
   ~MapFile();
-  /// The other one is closed.
+  /// The moved-from object is closed.
   MapFile(MapFile&&) noexcept;
   MapFile& operator=(MapFile&&) = delete;
 
-  /// The file as it was given.
+  /// The file given to the constructor.
   const std::filesystem::path& file() const;
   /// All maps, ascending by number. O(size).
   std::vector<MapSummary> maps() const;
-  /// One map, as it was put in: its checksum is compared (Fault::kDamaged). O(size).
+  /// Reads one map and compares its checksum (Fault::kDamaged). O(size).
   StoredMap read(std::uint32_t map_id) const;
-  /// The submaps of a map that a drive left, in order of id, where they are; those whose content is
-  /// in others are not among them, and none in a file without submaps. O(size).
+  /// The submaps of a drive's map at their present poses, in order of id, without those whose
+  /// content is in others; empty for a file without submaps. O(size).
   std::vector<model::Submap> submaps(std::uint32_t map_id) const;
-  /// Its loop closures that count, in the order in which they came, without covariances.
+  /// Its valid loop closures in order of arrival, without covariances.
   std::vector<model::LoopClosure> closures(std::uint32_t map_id) const;
-  /// Where the frame of its maps lies on the earth; none where that is not known.
+  /// Location of its maps' frame on the earth; none where unknown.
   std::optional<model::MapReference> reference() const;
   /// All changes, the oldest first.
   std::vector<Change> history() const;
-  /// The version of Understory that wrote it last; empty where an older one did, which stated none.
+  /// The version of Understory that wrote it last; empty for older versions, which did not state
+  /// it.
   std::string program_version() const;
-  /// All that is wrong with it, a line each: pages and indexes of SQLite, tables and rows that a
-  /// GeoPackage must have, values, checksums of maps and of changes. O(size).
+  /// All faults, one per line: pages and indexes of SQLite, tables and rows that a GeoPackage must
+  /// have, values, checksums of maps and of changes. O(size).
   std::vector<std::string> check() const;
 
-  /// Puts maps in as one change and gives its number; a map of the same number is replaced, the
-  /// others stay. All or none of it.
+  /// Writes maps as one change and returns its number; maps of equal number are replaced, others
+  /// stay. All or nothing.
   std::uint64_t put(std::span<const StoredMap> maps, const ChangeNote& note);
-  /// Likewise one map, with where its submaps are now: as one change, which revert() takes back
-  /// whole. Fault::kRefused where a submap is none of the map's, or a closure's number is taken.
+  /// Writes one map with new poses of its submaps as one change, which revert() undoes as a whole.
+  /// Fault::kRefused where a submap is not the map's, or a closure's number is in use.
   std::uint64_t put(const StoredMap& map, const Placement& placement, const ChangeNote& note);
-  /// Says where the frame of all its maps lies on the earth; coordinates stay as they are. A
-  /// change, whose number it gives. O(features).
+  /// Sets the location of the maps' frame on the earth; coordinates stay. This is a change; returns
+  /// its number. O(features).
   std::uint64_t put(const model::MapReference& reference, const ChangeNote& note);
-  /// Brings all maps back to what they were after change `to` (0: before the first one), as a
-  /// change of its own whose number it gives; it can be reverted, too. What other programs changed
-  /// becomes a change before it. Fault::kRefused where there is no change `to`. O(all changes).
+  /// Restores all maps to the state after change `to` (0 = before the first one), as a new change,
+  /// which can be reverted too; returns its number. Changes by other programs are recorded before
+  /// it. Fault::kRefused where change `to` does not exist. O(all changes).
   std::uint64_t revert(std::uint64_t to, const ChangeNote& note);
-  /// Takes what other programs changed in maps over as a change and gives its number: from then on
-  /// it is what the checksums say. Fault::kRefused where they changed nothing, kDamaged where a map
-  /// is none any more. O(all changes).
+  /// Accepts changes of maps by other programs as a recorded change, updates the checksums and
+  /// returns its number. Fault::kRefused where there are none, kDamaged where a map became invalid.
+  /// O(all changes).
   std::uint64_t accept(const ChangeNote& note);
 
  private:
@@ -101,9 +102,9 @@ class MapFile {
   Access access_;
 };
 
-/// Makes a new file with these maps, and with where their frame lies, as its first change: whole,
-/// or not at all. Links are followed. Fault::kRefused where something is there already. Killed in
-/// between, it leaves at most a file FILE.part-XXXXXX.
+/// Creates a new file with these maps and the location of their frame as its first change,
+/// completely or not at all. Links are followed. Fault::kRefused where the name exists already. If
+/// the process is killed, at most a file FILE.part-XXXXXX is left.
 void create_map_file(const std::filesystem::path& file, std::span<const StoredMap> maps,
                      const ChangeNote& note,
                      const std::optional<model::MapReference>& reference = std::nullopt);

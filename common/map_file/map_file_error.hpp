@@ -1,4 +1,4 @@
-// What can be wrong with a map file.
+// Errors of map files.
 #pragma once
 
 #include <stdexcept>
@@ -6,25 +6,24 @@
 
 namespace understory::map_file {
 
-/// Why a map file was not opened, read or written.
+/// The reason why a map file was not opened, read or written.
 enum class Fault {
-  kUnreadable,    ///< It is not there, is no regular file, or the device failed.
-  kForeign,       ///< It is something else: no GeoPackage, or none of ours.
-  kOtherVersion,  ///< Its schema is older or newer than the one this version has.
+  kUnreadable,    ///< It is missing, not a regular file, or the device failed.
+  kForeign,       ///< It is not a GeoPackage, or not one of ours.
+  kOtherVersion,  ///< Its schema is older or newer than the supported ones.
   kInUse,         ///< Another process has it open.
-  kReadOnly,      ///< It was to be changed and cannot be.
+  kReadOnly,      ///< It cannot be changed.
   kFull,          ///< There is no room on the device. Nothing was changed.
-  kDamaged,       ///< Its content is not what was written.
-  kUntrusted,     ///< It was to be changed, and SQL in it that is not ours would act then. Nothing
-                  ///< was changed.
-  kRefused,  ///< What was to be done makes no sense: a map or a change that it has not, a value
-             ///< that a map cannot have. Nothing was changed.
+  kDamaged,       ///< Its content differs from the written content.
+  kUntrusted,     ///< A change would run foreign SQL in the file. Nothing was changed.
+  kRefused,  ///< The request is invalid: a missing map or change, or an impossible value. Nothing
+             ///< was changed.
 };
 
-/// what() is one line that names the file.
+/// An error of a map file; what() is one line with the file name.
 class MapFileError : public std::runtime_error {
  public:
-  /// From the kind of fault and the line that what() gives.
+  /// Takes the kind of fault and the line for what().
   MapFileError(Fault fault, const std::string& line) : std::runtime_error(line), fault_(fault) {}
   /// The kind of fault.
   Fault fault() const { return fault_; }

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr off_t kFirstLockByte = 0x40000000;
 constexpr off_t kLockBytes = 512;
 
-/// Whether any process holds a lock on it, as everybody does who has it open.
+/// Whether any process has a lock on it; every process that has it open has one.
 bool is_locked(const fs::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return false;
@@ -36,7 +36,7 @@ bool is_locked(const fs::path& file) {
   return is_held;
 }
 
-/// The version of the format says whether SQLite would make a log when it reads.
+/// Whether the format's version makes SQLite create a log when reading.
 bool asks_for_log(const fs::path& file) {
   constexpr std::streamoff kWriteVersion = 18;
   constexpr char kLogVersion = 2;
@@ -54,7 +54,7 @@ bool is_drive_under_way(const fs::path& file) {
          is_open_drive(connection);
 }
 
-/// Why the file must be brought in before it is read; empty where it need not.
+/// The reason why the file must be recovered before reading; empty = not needed.
 std::string remark_on(const fs::path& file) {
   const fs::path left = left_beside(file);
   if (!left.empty())
@@ -71,7 +71,7 @@ fs::path temporary_folder() {
   return name;
 }
 
-/// The copy is not what the person named.
+/// Replaces the copy's name in the error by the name that the user gave.
 [[noreturn]] void rethrow_as(const MapFileError& error, const fs::path& copy,
                              const fs::path& file) {
   std::string line = error.what();

@@ -1,4 +1,4 @@
-// A map file that is looked at, and not touched.
+// Read access to a map file without any change to it.
 #pragma once
 
 #include <filesystem>
@@ -9,25 +9,26 @@
 
 namespace understory::map_file {
 
-/// A file as it is, though its last writer was killed: where a log or a journal lies beside it, or
-/// a drive's store did not end, a copy of it in the folder for temporary files is brought in
-/// instead, and is gone at the end. Nothing in the file's own folder changes.
+/// Reads a file also if its last writer was killed: if a log or a journal lies beside it, or a
+/// drive's store did not end, a temporary copy is recovered instead and deleted at the end. Nothing
+/// changes in the file's own folder.
 class MapLook {
  public:
-  /// Cost O(1), or O(size) for a copy. Throws MapFileError as MapFile does, Fault::kInUse where a
-  /// process writes. In this process the file must not be open otherwise: locks on it would end.
+  /// Cost O(1), or O(size) for a copy. Throws MapFileError like MapFile, Fault::kInUse where a
+  /// process writes. The file must not be open elsewhere in this process, because its locks would
+  /// end.
   explicit MapLook(const std::filesystem::path& file);
   ~MapLook();
   MapLook(const MapLook&) = delete;
   MapLook& operator=(const MapLook&) = delete;
 
-  /// What is in it.
+  /// The opened file.
   const MapFile& file() const { return *opened_; }
-  /// What was left and is shown as if it were brought in; empty where the file is at rest.
+  /// Describes the unfinished state that was recovered in the copy; empty if there was none.
   const std::string& remark() const { return remark_; }
 
  private:
-  std::filesystem::path folder_;  ///< Of the copy; empty where there is none.
+  std::filesystem::path folder_;  ///< Folder of the copy; empty without a copy.
   std::string remark_;
   std::unique_ptr<MapFile> opened_;
 };

@@ -15,14 +15,14 @@ std::int64_t row_number(std::uint32_t map_id, std::size_t i) {
   return static_cast<std::int64_t>(landmark_id(map_id, i + 1));
 }
 
-/// Each row behind the one before.
+/// Writes rows in order.
 template <class Rows, class Values>
 void insert_all(Rows rows, std::uint32_t map_id, const Values& values) {
   for (std::size_t i = 0; i < values.size(); ++i)
     rows.put(row_number(map_id, i), map_id, values[i]);
 }
 
-/// A column of a geometry of this kind, with so many points at least.
+/// Reads a column with a geometry of this kind and at least `least` points.
 std::vector<Eigen::Vector2d> points_in(const Connection& connection, const Statement& row,
                                        int column, GeometryKind kind, std::size_t least) {
   auto geometry = geometry_of(row.blob(column));
@@ -113,7 +113,7 @@ void select_loops(const Connection& connection, StoredMap& map) {
   }
 }
 
-/// A landmark is in one map of a file.
+/// Refuses landmarks of other maps: a landmark is in only one map of a file.
 void refuse_landmarks_of_others(const Connection& connection, const StoredMap& map) {
   Statement row = connection.prepare("SELECT map_id FROM landmarks WHERE landmark_id = ?1");
   for (const StoredLandmark& one : map.landmarks) {

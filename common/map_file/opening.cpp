@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
   throw MapFileError(fault, fmt::format("{}: {}", file.string(), why));
 }
 
-/// SQLite would take an empty file for a database, and a folder for a failure of the device. The
-/// file is not opened here: closing it would end the locks that this process has on it.
+/// SQLite would accept an empty file as a database, and report a folder as a failure of the device.
+/// The file is not opened here, because closing it would release this process's locks on it.
 void require_database(const fs::path& file) {
   std::error_code ignored;
   const fs::file_status status = fs::status(file, ignored);
@@ -35,8 +35,8 @@ void require_database(const fs::path& file) {
 
 fs::path beside(const fs::path& file, const char* suffix) { return file.string() + suffix; }
 
-/// Whether it is as leave() leaves it; a writer that was killed, or could not end for want of room,
-/// leaves a log, or a file that asks for one.
+/// Whether leave() completed; a writer that was killed or lacked room leaves a log, or a file in
+/// the format with a log.
 bool is_at_rest(const fs::path& file, const fs::path& target) {
   if (!left_beside(target).empty()) return false;
   try {
@@ -53,7 +53,7 @@ bool can_be_written(const fs::path& file) {
          ::faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) == 0;
 }
 
-/// SQLite takes a last page that was cut for one with zeros at its end.
+/// SQLite treats a truncated last page as one filled with zeros.
 void require_whole(const Connection& connection) {
   const auto page = static_cast<std::uintmax_t>(connection.number("PRAGMA page_size"));
   if (fs::file_size(connection.file()) % page != 0) connection.damaged("it was cut");
@@ -61,23 +61,23 @@ void require_whole(const Connection& connection) {
 
 void check_keys(const Connection& connection) { connection.execute("PRAGMA foreign_keys = ON"); }
 
-/// The user's mask decides, as for any other file.
+/// Applies the user's mask, as for any other file.
 void give_usual_rights(int descriptor) {
   const mode_t mask = ::umask(0);
   ::umask(mask);
   ::fchmod(descriptor, 0666U & ~mask);
 }
 
-/// Never in place of a file that is there. 0, or the errno.
+/// Renames, but never over an existing file. Returns 0, or the errno.
 int rename_to_new(const fs::path& from, const fs::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
-  // Some file systems cannot.
+  // Some file systems do not support it.
   if (errno != EINVAL && errno != ENOSYS) return errno;
   if (fs::exists(to)) return EEXIST;
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
 }
 
-/// The name is on the device, too.
+/// Flushes the folder, so that the name is on the device too.
 void sync_folder_of(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -107,7 +107,8 @@ std::unique_ptr<Connection> open_at_rest(const fs::path& file) {
   return connection;
 }
 
-/// The file alone says neither what is in it nor that it is damaged.
+/// The error for a log that cannot be brought in: the file alone shows neither its content nor
+/// damage.
 [[noreturn]] void cannot_bring_in(const fs::path& file, const fs::path& left,
                                   const MapFileError& error) {
   const bool is_fixed = !can_be_written(left);
@@ -127,10 +128,10 @@ bool is_of_the_disk(const MapFileError& error) {
 std::unique_ptr<Connection> begin_writing(const fs::path& file) {
   const bool is_alone = left_beside(target_of(file)).empty();
   auto connection = std::make_unique<Connection>(file, Access::kWrite, file);
-  // Before the first look at it: then the log's index is in memory, and locks stay.
+  // Set before the first access, so that the log's index is in memory and locks stay.
   connection->execute("PRAGMA locking_mode = EXCLUSIVE");
   check_keys(*connection);
-  // A file that is not ours is not touched.
+  // A foreign file is not changed.
   verify_schema(*connection);
   if (is_alone) require_whole(*connection);
   if (sqlite3_db_readonly(connection->handle(), "main") != 0)
@@ -140,7 +141,7 @@ std::unique_ptr<Connection> begin_writing(const fs::path& file) {
   connection->execute("PRAGMA synchronous = FULL");
   if (connection->text("PRAGMA journal_mode = WAL") != "wal")
     cannot(Fault::kReadOnly, connection->file(), "no write-ahead log can be kept beside it");
-  // Takes the lock that all others meet.
+  // Takes the lock that excludes all others.
   connection->execute("BEGIN EXCLUSIVE; COMMIT");
   upgrade_schema(*connection);
   return connection;

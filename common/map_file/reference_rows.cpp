@@ -22,7 +22,7 @@ bool has_reference_table(const Connection& connection) {
   return find.bind(kReferenceTable).step();
 }
 
-/// The same coordinates under another number.
+/// Keeps the coordinates and changes the number of the reference system.
 void renumber_layer(const Connection& connection, const Layer& layer, std::int32_t srs_id) {
   std::vector<std::int64_t> keys;
   Statement row = connection.prepare(fmt::format("SELECT {} FROM {}", layer.key, layer.table));

@@ -1,4 +1,4 @@
-// Where the frame of a file's maps lies on the earth: one row, and what other programs read of it.
+// Location of the maps' frame on the earth: one row, and the rows that other programs read.
 #pragma once
 
 #include <cstdint>
@@ -11,23 +11,22 @@
 
 namespace understory::map_file {
 
-/// The table, which files have from version 4 on.
+/// The table, in files from version 4 on.
 std::vector<SchemaObject> reference_objects();
-/// Tells other programs that the table is ours.
+/// Registers the table for other programs.
 void register_reference_table(const Connection& connection);
 
-/// What the file states; none where its frame lies nowhere, and in files of older versions.
+/// The location stated in the file; none without a location, and in files of older versions.
 std::optional<model::MapReference> select_reference(const Connection& connection);
-/// States it, and gives the geometries of all layers its number; their coordinates stay. The
-/// checksums of maps are stated anew by who calls. O(features).
+/// Writes the location and gives the geometries of all layers its number; coordinates stay. The
+/// caller must update the maps' checksums. O(features).
 void put_reference(const Connection& connection, const model::MapReference& reference);
 
-/// The number of the reference system that geometries state.
+/// The number of the geometries' reference system.
 std::int32_t srs_of_layers(const Connection& connection);
-/// Brings the rows by which other programs find the layers' system in step with what the file
-/// states.
+/// Updates the rows by which other programs find the layers' reference system.
 void refresh_registration(const Connection& connection);
-/// Whether they are.
+/// Whether these rows are up to date.
 bool is_registered(const Connection& connection);
 
 }  // namespace understory::map_file

@@ -12,7 +12,7 @@
 namespace understory::map_file {
 namespace {
 
-/// As OGC 12-128 (1.3) has them in annex C.
+/// Tables of OGC 12-128 (1.3), annex C.
 constexpr std::string_view kSpatialRefSys = R"(CREATE TABLE gpkg_spatial_ref_sys (
   srs_name TEXT NOT NULL,
   srs_id INTEGER NOT NULL PRIMARY KEY,
@@ -121,16 +121,16 @@ constexpr std::string_view kLoopClosures = R"(CREATE TABLE loop_closures (
 constexpr std::string_view kWgs84 =
     R"(GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AXIS["Latitude",NORTH],AXIS["Longitude",EAST],AUTHORITY["EPSG","4326"]])";
 
-/// OGC 12-128 (1.3), F.3: the index of a layer and the triggers that keep it. <t> is the layer,
-/// <i> its key, <e> an event.
+/// OGC 12-128 (1.3), F.3: the index of a layer and its triggers. <t> is the layer, <i> its key, <e>
+/// an event.
 struct IndexPart {
   std::string_view suffix;
   std::string_view sql;
 };
-/// The events of update3 and update4, which are for a feature that gets another number. The
-/// standard has UPDATE of any column: then SQLite compiles ST_IsEmpty into each UPDATE, and a plain
-/// sqlite3, which has no such function, changes no attribute. `ON` begins a line, since GDAL takes
-/// " AFTER UPDATE OF ... ON " in update3 for an error of GeoPackage 1.0 and writes it anew.
+/// The events of update3 and update4, for a feature that gets another number. With UPDATE of any
+/// column, as in the standard, SQLite would compile ST_IsEmpty into each UPDATE, and a plain
+/// sqlite3 without this function could not change attributes. `ON` begins a line, because GDAL
+/// treats " AFTER UPDATE OF ... ON " in update3 as an error of GeoPackage 1.0 and rewrites it.
 constexpr std::string_view kAnyUpdate = "AFTER UPDATE ON <t>";
 constexpr std::string_view kUpdateOfKey = "AFTER UPDATE OF <i>\nON <t>";
 constexpr IndexPart kIndexParts[] = {
@@ -257,7 +257,7 @@ void state_version(const Connection& connection) {
   state_program(connection);
 }
 
-/// Those of the layers' indexes, in place of what is there.
+/// Replaces the triggers of the layers' indexes.
 void renew_triggers(const Connection& connection) {
   for (const SchemaObject& object : schema_objects()) {
     if (!object.sql.starts_with("CREATE TRIGGER")) continue;

@@ -40,7 +40,7 @@ std::vector<Definition> definitions_in(const Connection& connection) {
   return definitions;
 }
 
-/// GDAL keeps the number of features of a layer by these where a file has them.
+/// GDAL counts the features of a layer with these objects, if a file has them.
 std::vector<SchemaObject> counting_objects() {
   std::vector<SchemaObject> objects{
       {"gpkg_ogr_contents",
@@ -60,7 +60,7 @@ std::vector<SchemaObject> counting_objects() {
   return objects;
 }
 
-/// What a file of a version has, as SQLite writes it down, with what the R*Trees consist of.
+/// The definitions in a file of a version, in SQLite's form, including the tables of the R*Trees.
 Definitions own_definitions(std::int64_t version) {
   const Connection empty("(a new file)");
   for (const SchemaObject& object : schema_objects(version)) empty.execute(object.sql);
@@ -105,7 +105,7 @@ std::string lower_name(std::string_view name) {
   return text;
 }
 
-/// The tables to which others may add attributes: those that other programs list.
+/// Whether other programs may add attributes to the table: only to the listed layers.
 bool may_have_attributes(std::string_view table) {
   return table == "understory_maps" ||
          std::ranges::find(kLayers, table, &Layer::table) != kLayers.end();
@@ -118,7 +118,7 @@ bool is_as_ours(const Definition& own, const Definition& other) {
           adds_plain_columns(own.sql, other.sql));
 }
 
-/// Definitions by their names and texts; the triggers that SQLite would run are found apart.
+/// Checks a definition by its name and text; check_triggers() finds triggers that SQLite would run.
 void check_definition(const Definition& one, const Definitions& own, Lines& findings) {
   const std::string name = lower_name(one.name);
   if (const auto found = own.find(name); found != own.end()) {
@@ -133,7 +133,7 @@ void check_definition(const Definition& one, const Definitions& own, Lines& find
   }
 }
 
-/// Its own tables that rows are written to.
+/// Our tables into which rows are written.
 std::vector<std::string> written_tables(const Definitions& own) {
   std::vector<std::string> tables;
   for (const auto& [name, one] : own) {
@@ -143,8 +143,8 @@ std::vector<std::string> written_tables(const Definitions& own) {
   return tables;
 }
 
-/// An index of columns, as they are, costs time and room. One that is unique makes REPLACE take
-/// other rows out; expressions, conditions and collations run.
+/// A plain index of columns is harmless. A unique one would make REPLACE delete other rows;
+/// expressions, conditions and collations would run.
 void check_indexes(const Connection& connection, std::string_view table, const Definitions& own,
                    Lines& findings) {
   Statement index = connection.prepare(
@@ -166,7 +166,7 @@ std::string sql_name(std::string_view name) {
   return text + '"';
 }
 
-/// Statements that begin everything which can follow from writing the table.
+/// Statements that cover all effects of writing the table.
 std::vector<std::string> writings_of(const Connection& connection, std::string_view table) {
   std::string columns;
   Statement column = connection.prepare("SELECT name FROM pragma_table_info(?1)");
@@ -197,7 +197,8 @@ int note_others(void* context, int /*action*/, const char* /*what*/, const char*
   return SQLITE_OK;
 }
 
-/// While it lives, SQLite tells which triggers and views it would run, and nothing may be stepped.
+/// During its lifetime SQLite reports the triggers and views that it would run; no statement may be
+/// stepped.
 class Listening {
  public:
   explicit Listening(const Connection& connection) : connection_(connection) {
@@ -212,7 +213,7 @@ class Listening {
   Listening(const Listening&) = delete;
   Listening& operator=(const Listening&) = delete;
 
-  /// What was named since the last time.
+  /// Names reported since the last call.
   Names take() { return std::exchange(names_, {}); }
 
  private:
@@ -221,8 +222,8 @@ class Listening {
   Names names_;
 };
 
-/// SQLite compiles the triggers of a statement, and those of what these write, when it prepares it:
-/// it says itself what would run.
+/// SQLite compiles the triggers of a statement, and the triggers of their writes, in prepare: it
+/// reports itself what would run.
 void check_triggers(const Connection& connection, const std::string& table, Lines& findings) {
   const std::vector<std::string> writings = writings_of(connection, table);
   Names found;
@@ -272,7 +273,7 @@ void require_own_sql(const Connection& connection) {
 }
 
 void deny_foreign_sql(sqlite3* handle) {
-  own_triggers();  // Before SQLite calls: nothing may be thrown through it.
+  own_triggers();  // Computed before SQLite calls back, where no exception may pass.
   sqlite3_set_authorizer(handle, deny_others, nullptr);
 }
 

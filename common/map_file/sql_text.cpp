@@ -31,7 +31,7 @@ std::string lower_case(std::string_view text) {
 
 bool is_digit(char letter) { return letter >= '0' && letter <= '9'; }
 
-/// Bytes above ASCII are parts of names, as in SQLite.
+/// Bytes above ASCII belong to names, as in SQLite.
 bool is_of_name(char letter) {
   const char small = lower(letter);
   return (small >= 'a' && small <= 'z') || is_digit(letter) || letter == '_' || letter == '$' ||
@@ -42,8 +42,7 @@ bool is_space(char letter) {
   return letter == ' ' || letter == '\n' || letter == '\t' || letter == '\r' || letter == '\f';
 }
 
-/// The text from the quote at the front to the one that ends it, both included; empty where none
-/// does.
+/// The quoted text at the front, quotes included; empty where it is not closed.
 std::string_view quoted_at_front(std::string_view sql) {
   const char end = sql.front() == '[' ? ']' : sql.front();
   for (std::size_t at = 1; at < sql.size(); ++at) {
@@ -62,7 +61,7 @@ std::string_view while_true(std::string_view sql, bool (*holds)(char)) {
 
 bool is_of_number(char letter) { return is_of_name(letter) || letter == '.'; }
 
-/// Without its quotes; a doubled one inside stands for one.
+/// The text without its quotes; a doubled quote inside means one.
 std::string unquoted(std::string_view text) {
   const char end = text.front() == '[' ? ']' : text.front();
   std::string result;
@@ -73,7 +72,7 @@ std::string unquoted(std::string_view text) {
   return result;
 }
 
-/// Takes the first token away from the text, which begins with no space.
+/// Removes the first token from the text, which must not begin with a space.
 Token take_token(std::string_view& sql) {
   const char first = sql.front();
   const auto taken = [&sql](std::size_t size) {
@@ -111,7 +110,7 @@ bool is_plain_name(const Token& token) {
   return token.kind == TokenKind::kWord && !is_keyword(token.text);
 }
 
-/// A quoted name is the same as a bare one, but "NOT" is a name where NOT is none.
+/// A quoted name equals a bare one, but "NOT" is a name and NOT is a keyword.
 bool is_same_token(const Token& ours, const Token& theirs) {
   if (ours.text != theirs.text) return false;
   if (ours.kind == theirs.kind) return true;
@@ -127,12 +126,12 @@ bool is_symbol(const Token& token, std::string_view symbol) {
   return token.kind == TokenKind::kSymbol && token.text == symbol;
 }
 
-/// Goes through the columns that stand behind a table's own ones, token by token.
+/// Reads the columns after a table's own ones, token by token.
 class ColumnReader {
  public:
   ColumnReader(const Tokens& tokens, std::size_t at) : tokens_(tokens), at_(at) {}
 
-  /// Columns, each with a comma before it, and the parenthesis that ends the table.
+  /// Reads columns, each after a comma, and the parenthesis that ends the table.
   bool reads_columns_to_the_end() {
     while (takes_symbol(",")) {
       if (!takes_name()) return false;
@@ -156,7 +155,7 @@ class ColumnReader {
   bool takes_name() { return takes_if(is_plain_name(next()) || next().kind == TokenKind::kQuoted); }
   bool takes_number() { return takes_if(next().kind == TokenKind::kNumber); }
 
-  /// TEXT, DOUBLE PRECISION, TEXT(20), NUMERIC(8, 2), or nothing.
+  /// Reads a type: TEXT, DOUBLE PRECISION, TEXT(20), NUMERIC(8, 2), or none.
   void takes_type() {
     while (takes_if(is_plain_name(next()))) {
     }
@@ -195,7 +194,7 @@ bool is_same_sql(std::string_view ours, std::string_view theirs) {
 bool adds_plain_columns(std::string_view ours, std::string_view theirs) {
   const Tokens own = tokens_of(ours);
   const Tokens other = tokens_of(theirs);
-  // All of ours but for the parenthesis at its end.
+  // Compare all of ours except the closing parenthesis.
   if (own.empty() || !is_symbol(own.back(), ")") || other.size() <= own.size()) return false;
   const std::size_t shared = own.size() - 1;
   for (std::size_t i = 0; i < shared; ++i)

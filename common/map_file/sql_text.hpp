@@ -1,4 +1,4 @@
-// Definitions of a schema, compared by what they say.
+// Comparison of a schema's definitions by their meaning.
 #pragma once
 
 #include <string_view>
@@ -6,15 +6,15 @@
 namespace understory::map_file {
 
 /// Whether two definitions are the same to SQLite by their words alone: spaces, the case of words,
-/// and quotes around names that are no keywords do not count. Comments count as a difference.
+/// and quotes around names that are no keywords are ignored. Comments are a difference.
 bool is_same_sql(std::string_view ours, std::string_view theirs);
 
-/// Whether the table `theirs` is `ours` with columns added at its end as other programs add
-/// attributes: name, type, NOT NULL, a constant as DEFAULT. Computed columns, checks, keys,
-/// references and collations are none of these.
+/// Whether the table `theirs` is `ours` plus columns at its end in the form of attributes of other
+/// programs: name, type, NOT NULL, a constant as DEFAULT. Computed columns, checks, keys,
+/// references and collations are not allowed.
 bool adds_plain_columns(std::string_view ours, std::string_view theirs);
 
-/// Whether it defines an R*Tree as GeoPackage has them, of any name.
+/// Whether it defines an R*Tree in GeoPackage's form, with any name.
 bool is_geopackage_index(std::string_view sql);
 
 /// Whether it defines a virtual table.

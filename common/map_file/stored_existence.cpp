@@ -19,7 +19,7 @@ std::string existence_fault(model::LandmarkId id, const std::string& fault) {
   return fault.empty() ? fault : fmt::format("existence of landmark {}: {}", id, fault);
 }
 
-/// A message has room for one more state of so many bytes.
+/// Whether a message has room for one more state of this size.
 bool takes_more(const model::ExistenceState& message, std::size_t bytes) {
   const std::size_t landmarks = message.landmarks.size();
   return landmarks < kStatesTogether && message.states.size() == landmarks * bytes;

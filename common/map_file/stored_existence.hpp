@@ -1,4 +1,4 @@
-// What the existence tracker goes on with on the next drive, as it is stored with a map.
+// The existence tracker's state for the next drive, stored with a map.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,13 @@ namespace understory::map_file {
 
 class MapFile;
 
-/// Landmarks in one message of existence_of() at most.
+/// Largest number of landmarks in one message of existence_of().
 inline constexpr std::size_t kStatesTogether = 200;
 
-/// Of one landmark.
+/// Stored state of one landmark.
 struct ExistenceRow {
   model::LandmarkExistence existence;  ///< Its id, its probability, whether it is in use.
-  model::Utime utime = 0;              ///< Of the keyframe after which this holds [us].
+  model::Utime utime = 0;              ///< Stamp of the keyframe after which this is valid [us].
   std::string state;                   ///< The tracker's bytes; at least one.
   bool operator==(const ExistenceRow&) const = default;
 
@@ -30,9 +30,9 @@ struct ExistenceRow {
   }
 };
 
-/// Of a map.
+/// Stored state of a map.
 struct StoredExistence {
-  model::Utime utime = 0;  ///< Of the keyframe after which `learned` holds [us].
+  model::Utime utime = 0;  ///< Stamp of the keyframe after which `learned` is valid [us].
   /// The tracker's bytes on detector and world, for all landmarks: ExistenceState::model.
   std::string learned;
   std::vector<ExistenceRow> landmarks;  ///< In order of id.
@@ -45,19 +45,19 @@ struct StoredExistence {
   }
 };
 
-/// The newest state of each landmark, from EXISTENCE_STATE as it comes. Of two with one
-/// stamp the later message counts. Memory: O(landmarks).
+/// The newest state of each landmark, from received EXISTENCE_STATE messages. Of two with equal
+/// stamps the later message is used. Memory: O(landmarks).
 class NewestExistence {
  public:
-  /// O(landmarks of the message * log). Precondition: fault_of() finds nothing in the message.
+  /// O(landmarks of the message * log). Precondition: fault_of() of the message is empty.
   void take(const model::ExistenceState& state);
-  /// Forgets a landmark that is no more. O(log).
+  /// Drops a removed landmark. O(log).
   void drop(model::LandmarkId id) { rows_.erase(id); }
-  /// Forgets all landmarks that a map has given ids to. O(landmarks of it).
+  /// Drops all landmarks whose ids were assigned by a map. O(landmarks of it).
   void drop_given_by(std::uint32_t map_id);
   /// Whether nothing was taken.
   bool empty() const { return !has_learned_ && rows_.empty(); }
-  /// All of it. O(landmarks).
+  /// The complete state. O(landmarks).
   StoredExistence stored() const;
 
   /// Members of a saved state; see common/state.
@@ -73,20 +73,20 @@ class NewestExistence {
   std::map<model::LandmarkId, ExistenceRow> rows_;
 };
 
-/// What no map can have in such a message: a landmark of no map or of a later one, a probability
-/// beyond 0 to 1, a landmark without state, ids that do not ascend; empty where nothing is wrong.
+/// Fault of such a message: a landmark of no map or of a later one, a probability outside 0 to 1, a
+/// landmark without state, ids not ascending; empty = no fault.
 std::string fault_of(const model::ExistenceState& state);
-/// The same of what is stored with a map that has these landmarks, ids ascending: each landmark
-/// with a state is one of them.
+/// The same for the state stored with a map of these landmarks (ids ascending): each landmark with
+/// a state must be one of them.
 std::string fault_of(const StoredExistence& existence, std::span<const model::LandmarkId> ids);
 
-/// What is stored as messages of EXISTENCE_STATE, of kStatesTogether landmarks at most and of one
-/// number of bytes for each landmark; numbered from 0, stamped with the newest state in each. At
-/// least one message, since it carries what was learned.
+/// The stored state as messages of EXISTENCE_STATE, each with at most kStatesTogether landmarks and
+/// an equal number of bytes per landmark; numbered from 0, stamped with the newest state in each.
+/// At least one message, because it carries the learned values.
 std::vector<model::ExistenceState> messages_of(std::uint32_t map_id,
                                                const StoredExistence& existence);
-/// The state with which the tracker starts in a stored map, as messages; none where the map was
-/// stored without. Throws MapFileError as MapFile::read() does. O(size of the map).
+/// The state with which the tracker starts in a stored map, as messages; none if the map was stored
+/// without one. Throws MapFileError like MapFile::read(). O(size of the map).
 std::vector<model::ExistenceState> existence_of(const MapFile& file, std::uint32_t map_id);
 
 }  // namespace understory::map_file

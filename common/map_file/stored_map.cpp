@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMostRadiusM = 1e3;
 constexpr double kMostVariance = 1e18;
-/// Of a covariance, relative to its largest variance: what rounding leaves.
+/// Rounding error of a covariance, relative to its largest variance.
 constexpr double kRounding = 1e-9;
 constexpr auto kMostSequence = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
 

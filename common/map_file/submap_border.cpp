@@ -19,7 +19,8 @@ constexpr double kMargin_m = 0.5;
 }  // namespace
 
 std::vector<Eigen::Vector2d> border_around(std::span<const Eigen::Vector2d> places_m) {
-  // Corners of a square around each place: then the hull of few or collinear places is a polygon.
+  // Use the corners of a square around each position, so that the hull of few or collinear
+  // positions is a polygon.
   bg::model::multi_point<HullPoint> points;
   points.reserve(4 * places_m.size());
   for (const Eigen::Vector2d& place : places_m) {
@@ -34,7 +35,7 @@ std::vector<Eigen::Vector2d> border_around(std::span<const Eigen::Vector2d> plac
   std::vector<Eigen::Vector2d> corners;
   corners.reserve(hull.outer().size());
   for (const HullPoint& point : hull.outer()) corners.emplace_back(point.x(), point.y());
-  // Boost closes its rings.
+  // Boost repeats the first corner.
   if (corners.size() > 1) corners.pop_back();
   std::reverse(corners.begin(), corners.end());
   return corners;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr state::Format kKeyframes{"map_file.keyframes", 1};
 constexpr double kCornerStep_m = 1e-2;
-/// zlib packs at most so much into one byte: more is no honest length.
+/// zlib packs at most this many bytes into one; a larger stated length is damage.
 constexpr std::uint64_t kMostPerByte = 1040;
 constexpr unsigned kGroupBits = 7;
 constexpr unsigned kMostShift = 63;
@@ -31,7 +31,7 @@ class NumberWriter {
     const auto bits = static_cast<std::uint64_t>(value);
     add((bits << 1U) ^ (value < 0 ? ~std::uint64_t{0} : 0));
   }
-  /// In whole steps.
+  /// Adds a value in integer steps.
   void add_steps(double value, double step) {
     add_signed(static_cast<std::int64_t>(std::llround(value / step)));
   }
@@ -41,7 +41,7 @@ class NumberWriter {
   std::string bytes_;
 };
 
-/// Reads on while there are bytes; beyond them every number is 0 and is_whole() false.
+/// Reads numbers while there are bytes; beyond the end every number is 0 and is_whole() is false.
 class NumberReader {
  public:
   explicit NumberReader(std::string_view bytes) : bytes_(bytes) {}
@@ -65,7 +65,7 @@ class NumberReader {
   double next_steps(double step) { return static_cast<double>(next_signed()) * step; }
   std::size_t left() const { return bytes_.size(); }
   bool is_whole() const { return is_whole_; }
-  /// Read to its end, and nothing was missing.
+  /// Whether all bytes were read and none was missing.
   bool is_done() const { return is_whole_ && bytes_.empty(); }
 
  private:
@@ -73,7 +73,8 @@ class NumberReader {
   bool is_whole_ = true;
 };
 
-/// The lower triangle of the Cholesky factor; what rounding would make nothing is one step.
+/// Adds the lower triangle of the Cholesky factor; an entry that would round to zero becomes one
+/// step.
 void add_covariance(const Eigen::Matrix2d& covariance, NumberWriter& out) {
   const double xx = std::sqrt(std::max(0.0, covariance(0, 0)));
   const double xy = xx > 0.0 ? 0.5 * (covariance(0, 1) + covariance(1, 0)) / xx : 0.0;

@@ -67,7 +67,7 @@ std::vector<model::LandmarkId> ground_landmarks(const Connection& connection,
   return ids;
 }
 
-/// The submap of each of these landmarks has come back.
+/// Marks the submaps of these landmarks as taken back.
 void note_back(const Connection& connection, const GroundChange& change) {
   Statement owner = connection.prepare(
       "SELECT submap_id FROM landmarks WHERE landmark_id = ?1 AND submap_id IS NOT NULL");
@@ -105,7 +105,7 @@ void show_submap(const Connection& connection, const model::Submap& submap,
 
 void redraw_submap(const Connection& connection, const PlacedSubmap& placed) {
   const auto state = state_of(connection, placed.key);
-  // What came back is where the mapper says.
+  // The mapper determines the pose of a submap taken back.
   if (!state || state->state != kAway) return;
   const auto submap = select_submap(connection, placed.key);
   Statement owned =

@@ -12,7 +12,7 @@ namespace {
 std::int64_t as_integer(std::uint64_t value) { return static_cast<std::int64_t>(value); }
 std::int64_t map_of(const SubmapKey& key) { return std::int64_t{key.map_id}; }
 
-/// A submap's columns that are bytes.
+/// A submap's columns of bytes.
 struct SubmapBytes {
   Blob replaces;
   Blob border;

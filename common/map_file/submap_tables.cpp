@@ -5,7 +5,7 @@
 namespace understory::map_file {
 namespace {
 
-/// Everything in it is in the frame of the submap: a correction does not touch it.
+/// All its content is in the frame of the submap, so a correction does not change it.
 constexpr std::string_view kSubmaps = R"(CREATE TABLE understory_submaps (
   map_id INTEGER NOT NULL,
   submap_id INTEGER NOT NULL,
@@ -20,7 +20,7 @@ constexpr std::string_view kSubmaps = R"(CREATE TABLE understory_submaps (
   checksum TEXT NOT NULL,
   CONSTRAINT pk_understory_submaps PRIMARY KEY (map_id, submap_id)
 ))";
-/// is_drawn: the layers show the submap where this pose puts it.
+/// is_drawn: the layers show the submap at this pose.
 constexpr std::string_view kPoses = R"(CREATE TABLE understory_submap_poses (
   map_id INTEGER NOT NULL,
   submap_id INTEGER NOT NULL,
