@@ -23,8 +23,7 @@ namespace {
 /// Per axis [m]; see WindowSize.
 constexpr double kLocalSigma_m = 0.15;
 constexpr double kAnySigma_m = 1e9;
-/// One after the other: where maps have few landmarks in common, or are noisy, small windows are
-/// found nowhere.
+/// Tried one after the other: with few common landmarks or much noise, small windows are not found.
 constexpr std::array<WindowSize, 6> kWindows{{{30, kLocalSigma_m},
                                               {60, kLocalSigma_m},
                                               {150, kLocalSigma_m},
@@ -32,17 +31,17 @@ constexpr std::array<WindowSize, 6> kWindows{{{30, kLocalSigma_m},
                                               {150, kAnySigma_m},
                                               {400, kAnySigma_m}}};
 constexpr int kMostRounds = 10;
-/// A guess allows motions within so many of its standard deviations; these are told apart by [m],
-/// [rad].
+/// A guess allows motions within this many standard deviations; motions that differ by this [m],
+/// [rad] are distinct.
 constexpr double kGuessSigmas = 4.0;
 constexpr std::size_t kGuessPairs = 5;
 constexpr double kGuessDecades = 4.0;
 constexpr double kToldApart_m = 0.1;
 constexpr double kToldApart_rad = 0.01;
-/// Landmarks around one that the best motion is moved to, itself included.
+/// Neighbours of a landmark to which the best motion is shifted, itself included.
 constexpr std::size_t kNeighboursBeside = 13;
 
-/// A motion with all that speaks for it.
+/// A motion with its evidence.
 struct Verified {
   MotionFit fit;
   Pairing pairing;
@@ -78,7 +77,7 @@ class AlignmentSearch {
       map_.insert(i + 1, larger.all()[i].position_m);
   }
 
-  /// Only motions that a guess allows are looked at, and chance has only those.
+  /// Only motions allowed by a guess are tried, and the bound on chance counts only these.
   void take(const geometry::SE2WithCovariance& guess) {
     guess_ = guess;
     allowed_ = std::max(1.0, std::pow(2.0 * kGuessSigmas, 3) *
@@ -109,7 +108,7 @@ class AlignmentSearch {
 
   const LandmarkSet& smaller() const { return searches_second() ? second_ : first_; }
 
-  /// Whether windows of this size are those that were searched last.
+  /// Whether windows of this size equal those searched last.
   bool finds_the_same(const WindowSize& last, const WindowSize& size) const {
     const bool has_all = last.landmarks >= std::min(size.landmarks, smaller().all().size());
     const bool is_as_sure = std::ranges::all_of(smaller().all(), [&](const auto& one) {
@@ -130,7 +129,7 @@ class AlignmentSearch {
     }
   }
 
-  /// From what a window says to all landmarks of the overlap.
+  /// Verifies a window's motion on all landmarks of the overlap.
   std::optional<Verified> verify(const geometry::SE2WithCovariance& guess) const {
     geometry::RegistrationParameters registration;
     registration.gate_sigmas = parameters_.gate_sigmas;
@@ -141,7 +140,8 @@ class AlignmentSearch {
     Verified one;
     one.fit.model.first_T_second = registered.reference_T_observed;
     for (int round = 0; round < kMostRounds; ++round) {
-      // Less differs than the maps state where they are tied together; never so little in pairing.
+      // The residual may be below the stated covariances where errors are common; the pairing uses
+      // a lower limit.
       DifferenceModel model = one.fit.model;
       model.scale = std::max(1.0, model.scale);
       Pairing pairing = pair_up(first_, second_, model, parameters_);
@@ -154,8 +154,8 @@ class AlignmentSearch {
     return one;
   }
 
-  /// Rows of an orchard fit again one tree farther: the best motion, moved so that a landmark in
-  /// the middle falls on one of its neighbours, or turned about it.
+  /// Rows of an orchard fit again when shifted by one tree: tries the best motion shifted so that a
+  /// central landmark coincides with one of its neighbours, or rotated about it.
   void look_beside() {
     const DifferenceModel& model = best_->fit.model;
     const auto farther = [&](const LandmarkPair& pair) {
@@ -273,9 +273,9 @@ class AlignmentSearch {
   const std::function<void(double)>& progress_;
   std::vector<geometry::UncertainPoint> first_points_;
   std::vector<geometry::UncertainPoint> second_points_;
-  constellation::ConstellationMap map_;  ///< Of the larger one; ids are places in all(), plus 1.
-  std::optional<geometry::SE2WithCovariance> guess_;  ///< Where somebody says one.
-  /// Motions that it allows, of those that can be told apart.
+  constellation::ConstellationMap map_;  ///< The larger map; ids are indices in all(), plus 1.
+  std::optional<geometry::SE2WithCovariance> guess_;  ///< Guess, if given.
+  /// Number of distinct motions allowed by the guess.
   double allowed_ = std::numeric_limits<double>::infinity();
   std::optional<Verified> best_;
   double runner_up_ = 0.0;  ///< log10_tail of the best different motion.

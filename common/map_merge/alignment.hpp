@@ -1,4 +1,4 @@
-// Whether two maps of landmarks overlap, and how the frame of one lies in that of the other.
+// Finds whether two maps of landmarks overlap, and the relative pose of their frames.
 #pragma once
 
 #include <cstdint>
@@ -12,95 +12,96 @@
 
 namespace understory::map_merge {
 
-/// What is assumed of two maps, and when they are taken to overlap. Sigmas are standard deviations.
+/// Assumptions on two maps, and limits for accepting an overlap. Sigmas are standard deviations.
 struct AlignmentParameters {
-  double unknown_sigma_m = 0.1;  ///< Of a landmark without covariance, per axis [m].
-  double gate_sigmas = 4.0;      ///< Two landmarks may be one within so many standard deviations.
-  double gate_floor_m = 0.05;    ///< Standard error that no covariance has, per axis [m].
-  double max_gate_m = 1.0;       ///< Two landmarks farther apart are never one [m].
-  std::size_t min_pairs = 8;     ///< Fewest landmarks that both maps have.
-  /// Smallest share of the landmarks in the overlap, of the map that has fewer there, that both
-  /// maps have: two visits of a forest share a third at worst.
+  double unknown_sigma_m = 0.1;  ///< Sigma of a landmark without covariance, per axis [m].
+  /// Two landmarks may be the same within this many standard deviations.
+  double gate_sigmas = 4.0;
+  double gate_floor_m = 0.05;  ///< Additional error not in the covariances, per axis [m].
+  double max_gate_m = 1.0;     ///< Landmarks farther apart are never the same [m].
+  std::size_t min_pairs = 8;   ///< Least number of common landmarks.
+  /// Least share of common landmarks among the landmarks in the overlap, of the map with fewer
+  /// there: two visits of a forest share at least a third.
   double min_share = 0.2;
-  /// Overlap only if chance gives so many pairs less often than this, in all hypotheses tried ...
+  /// An overlap is accepted only if the expected number of equally good motions by chance, over all
+  /// hypotheses tried, is below this ...
   double max_log10_false_alarm = -9.0;
-  /// ... and if the best different motion is so many decades more likely to be chance ...
+  /// ... and is larger by this many decades for the best different motion ...
   double min_log10_margin = 6.0;
-  /// ... and this share of the decades of the best one: what repeats itself shows more than chance
-  /// in many places.
+  /// ... and by this share of the best one's decades: repeated structures exceed chance in many
+  /// places.
   double min_margin_share = 0.5;
 };
 
-/// Why two maps are taken to overlap, or not.
+/// Result of the search for an overlap.
 enum class AlignmentOutcome : std::uint8_t {
   kAligned = 0,
   kTooFewLandmarks = 1,  ///< A map has fewer than `min_pairs`.
-  kNoOverlap = 2,        ///< No part of one is found in the other.
-  kLikelyChance = 3,     ///< Not sure: chance gives as many pairs.
-  kFewInCommon = 4,      ///< Not sure: of the landmarks in the overlap too few are in both maps.
+  kNoOverlap = 2,        ///< No part of one was found in the other.
+  kLikelyChance = 3,     ///< Not sure: chance may give as many pairs.
+  kFewInCommon = 4,      ///< Not sure: too few landmarks of the overlap are in both maps.
   kAmbiguous = 5,        ///< Not sure: a different motion fits nearly as well.
 };
-/// One line for a person.
+/// One line of text.
 std::string_view describe(AlignmentOutcome outcome);
 
-/// A landmark that both maps have.
+/// A landmark of both maps.
 struct LandmarkPair {
   std::uint32_t first = 0;   ///< Index in the first map's landmarks.
   std::uint32_t second = 0;  ///< Index in the second map's landmarks.
-  double distance_m = 0.0;   ///< What the motion leaves between the two.
-  double chi2 = 0.0;         ///< The same by both covariances, two degrees of freedom.
-  /// Share of both stated variances that is this pair's own, 0 to 1. The rest is common to all
-  /// landmarks of a map: it moves the map as a whole.
+  double distance_m = 0.0;   ///< Distance between the two after the motion.
+  double chi2 = 0.0;  ///< Squared Mahalanobis distance by both covariances, two degrees of freedom.
+  /// Share of both stated variances that is independent for this pair, 0 to 1. The rest is common
+  /// to all landmarks of a map: it moves the whole map.
   double independent_share = 1.0;
 };
 
-/// How two maps lie to each other. But for `outcome` it is of the best motion found, also where
-/// that was not accepted.
+/// Relative pose of two maps. All but `outcome` belongs to the best motion found, also where it was
+/// not accepted.
 struct Alignment {
   AlignmentOutcome outcome = AlignmentOutcome::kNoOverlap;
   geometry::SE2 first_T_second;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Right perturbation; m, rad.
   std::vector<LandmarkPair> pairs;                       ///< One to one, by `second`.
-  std::size_t first_in_overlap = 0;   ///< Landmarks of the first map where the second has some.
-  std::size_t second_in_overlap = 0;  ///< And the other way round.
+  std::size_t first_in_overlap = 0;   ///< Landmarks of the first map in the area of the second.
+  std::size_t second_in_overlap = 0;  ///< Landmarks of the second map in the area of the first.
   std::size_t pairs_in_overlap = 0;
-  /// log10 of an upper bound on the expected number of so good motions by chance.
+  /// log10 of an upper bound on the expected number of equally good motions by chance.
   double log10_false_alarm = 0.0;
   double log10_margin = 0.0;   ///< Decades to the best different motion.
   std::size_t windows = 0;     ///< Parts of the smaller map that were searched.
   std::size_t hypotheses = 0;  ///< Motions tried.
 
-  /// True where the maps overlap for certain.
+  /// True where an overlap was accepted.
   bool found() const { return outcome == AlignmentOutcome::kAligned; }
-  /// Pairs over the landmarks in the overlap of the map that has fewer there; 0 to 1.
+  /// Pairs / landmarks in the overlap, of the map with fewer there; 0 to 1.
   double share() const;
-  /// Why, with the numbers; one line.
+  /// The reason with its numbers; one line.
   std::string reason(const AlignmentParameters& parameters) const;
 };
 
 /// Looks for the overlap with no prior. Windows of the smaller map are searched in the larger one
-/// (common/constellation), small windows first; each motion that comes of one is verified and
-/// refined on all landmarks of the overlap, with both maps' covariances. What is not finite is left
+/// (common/constellation), small windows first; each resulting motion is verified and refined on
+/// all landmarks of the overlap, with both maps' covariances. Values that are not finite are left
 /// out. The same maps give the same result. Cost: about linear in the landmarks of the smaller map;
 /// 12 s where two maps of 10,000 have a tenth in common, 31 s where they have nothing.
 ///
-/// The covariance takes what the pairs leave as independent from landmark to landmark, and the rest
-/// of the stated covariances as a rigid motion that is common to all landmarks of a map.
+/// In the covariance, the residuals of the pairs are independent from landmark to landmark, and the
+/// rest of the stated covariances is a rigid motion common to all landmarks of a map.
 ///
-/// `progress` is called now and then with the part of the search that is done, 0 to 1; what it
-/// throws ends the search.
+/// `progress` is called repeatedly with the fraction done, 0 to 1; an exception of it ends the
+/// search.
 Alignment align(
     std::span<const model::MapLandmark> first, std::span<const model::MapLandmark> second,
     const AlignmentParameters& parameters = {},
     const std::function<void(double)>& progress = [](double /*part*/) {});
 
-/// What is asked of landmarks where somebody says how the maps lie: 5 pairs, and 4 decades instead
-/// of 9 against chance and of 6 to a different motion (a guess is evidence, too; compare
-/// docs/decisions/093).
+/// Limits with a stated relative pose: 5 pairs, and 4 decades instead of 9 against chance and
+/// instead of 6 to a different motion (a guess is evidence too; compare docs/decisions/093).
 AlignmentParameters with_guess(AlignmentParameters parameters);
 
-/// Likewise where somebody says it: first_T_second with its covariance (right perturbation). Only
-/// motions within four standard deviations of it count, by with_guess(parameters). The same cost.
+/// Like align() with a stated first_T_second and its covariance (right perturbation). Only motions
+/// within four standard deviations of it are accepted, by with_guess(parameters). The same cost.
 Alignment align_near(const geometry::SE2WithCovariance& guess,
                      std::span<const model::MapLandmark> first,
                      std::span<const model::MapLandmark> second,

@@ -12,11 +12,11 @@ namespace {
 
 constexpr int kMostSteps = 20;
 constexpr double kConverged = 1e-10;
-/// Rounds in which motion and common part are estimated in turn.
+/// Rounds of alternating estimation of motion and common part.
 constexpr int kRounds = 4;
 /// Variance of a difference, per axis, where covariances are singular [m^2].
 constexpr double kLeast_m2 = 1e-6;
-/// The same as a share of what the pairs leave on average.
+/// The same as a share of the mean residual of the pairs.
 constexpr double kLeastShare = 0.1;
 
 using Jacobian = Eigen::Matrix<double, 2, 3>;
@@ -41,8 +41,8 @@ Eigen::Matrix<double, 3, 6> rows_of(const Jacobian& jacobian) {
   return rows;
 }
 
-/// Pairs in the middle of the second map's common landmarks: there translation and heading are
-/// hardly correlated, however far away the frame's origin is.
+/// Pairs relative to the mean of the second map's common landmarks: there translation and heading
+/// are hardly correlated, at any distance from the frame's origin.
 class PairFit {
  public:
   PairFit(const LandmarkSet& first, const LandmarkSet& second, std::span<const LandmarkPair> pairs,
@@ -98,8 +98,8 @@ class PairFit {
     }
   }
 
-  /// What the pairs leave is independent; the common motion P is the one with the least sum of
-  /// |S - left - J P J^T|^2 over the stated covariances S. Negative parts of it are cut off.
+  /// The residuals of the pairs are independent; the common motion's covariance P minimises the sum
+  /// of |S - left - J P J^T|^2 over the stated covariances S. Negative parts are cut off.
   void separate() {
     if (!(freedom() > 0.0)) return;
     double squared = 0.0;

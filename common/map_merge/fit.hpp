@@ -1,4 +1,4 @@
-// The motion that two maps' common landmarks give, and how well it is known.
+// The motion from two maps' common landmarks, and its covariance.
 #pragma once
 
 #include <span>
@@ -9,14 +9,15 @@ namespace understory::map_merge {
 
 /// Least squares over pairs.
 struct MotionFit {
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of the motion; right perturbation.
-  DifferenceModel model;                                 ///< With the motion.
+  /// Covariance of the motion; right perturbation.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  DifferenceModel model;  ///< Model of differences at the motion.
 };
 
-/// Gauss-Newton from `start`, with both covariances. Precondition: two pairs at different places or
-/// more. What the pairs leave shows how much of the stated covariances is independent from landmark
-/// to landmark; a rigid motion common to all is fitted to the rest of them. The covariance is that
-/// of independent errors and that motion. O(pairs).
+/// Gauss-Newton from `start`, with both covariances. Precondition: at least two pairs at different
+/// positions. The residuals of the pairs show which part of the stated covariances is independent
+/// from landmark to landmark; a common rigid motion is fitted to the rest. The covariance combines
+/// independent errors and this common motion. O(pairs).
 MotionFit fit_motion(const LandmarkSet& first, const LandmarkSet& second,
                      std::span<const LandmarkPair> pairs, const geometry::SE2& start);
 

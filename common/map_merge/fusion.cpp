@@ -18,7 +18,7 @@ constexpr double kFusionCell_m = 2.0;
 /// Keeps sums of singular covariances invertible [m^2].
 constexpr double kLeastVariance_m2 = 1e-10;
 
-/// What the alignment says about the second map's landmarks, in the first one's frame.
+/// Transforms the second map into the first map's frame by the alignment.
 class Mover {
  public:
   Mover(const Alignment& alignment, double unknown_sigma_m)
@@ -33,18 +33,18 @@ class Mover {
   Eigen::Vector2d position(const Eigen::Vector2d& in_second_m) const {
     return motion_.mean * in_second_m;
   }
-  /// Without the error of the motion.
+  /// The rotated covariance without the error of the motion.
   Eigen::Matrix2d turned(const Eigen::Matrix2d& covariance_m2) const {
     return rotation_ * known(covariance_m2) * rotation_.transpose();
   }
-  /// Of a moved landmark, with the error of the motion.
+  /// Covariance of a moved landmark, with the error of the motion.
   Eigen::Matrix2d covariance(const model::MapLandmark& landmark) const {
     Eigen::Matrix<double, 2, 3> jacobian;
     jacobian << rotation_, rotation_ * geometry::perpendicular(landmark.position_m);
     return symmetric(turned(landmark.covariance_m2) +
                      jacobian * motion_.covariance * jacobian.transpose());
   }
-  /// A covariance that was not computed stays so.
+  /// A covariance that was not computed stays zero.
   model::KeyframePose moved(model::KeyframePose pose) const {
     const geometry::SE2WithCovariance there =
         geometry::compound(motion_, {pose.map_T_vehicle, pose.covariance});
@@ -76,7 +76,7 @@ std::uint32_t sum_of_counts(std::uint32_t a, std::uint32_t b) {
   return static_cast<std::uint32_t>(std::min(kMost, std::uint64_t{a} + b));
 }
 
-/// Both positions by the information of what is independent in them.
+/// Fuses both positions, weighted by the information of their independent parts.
 void fuse_places(model::MapLandmark& a, const model::MapLandmark& b, const Mover& mover,
                  double share) {
   const Eigen::Matrix2d stated = mover.known(a.covariance_m2);
@@ -132,7 +132,7 @@ class Adder {
 
   void add(const StoredLandmark& one) {
     StoredLandmark added = one;
-    added.submap_id.reset();  // Of the second map's submaps.
+    added.submap_id.reset();  // It is a number of the second map's submaps.
     added.landmark.position_m = mover_.position(one.landmark.position_m);
     added.landmark.covariance_m2 = mover_.covariance(one.landmark);
     added.landmark.id = map_file::landmark_id(merged_.map.map_id, ++last_counter_);
@@ -156,7 +156,7 @@ class Adder {
   MergedMaps& merged_;
   const Mover& mover_;
   double suspicious_m_;
-  constellation::PointGrid grid_;  ///< Of the first map's.
+  constellation::PointGrid grid_;  ///< Positions of the first map's landmarks.
   std::uint64_t last_counter_ = 0;
 };
 

@@ -8,9 +8,9 @@ namespace understory::map_merge {
 namespace {
 
 constexpr double kCell_m = 5.0;
-/// The distance to this neighbour tells how densely landmarks stand.
+/// The distance to this neighbour determines the density of landmarks.
 constexpr std::size_t kDensityNeighbour = 4;
-/// Landmarks that are asked for it, at most.
+/// Largest number of landmarks sampled for it.
 constexpr std::size_t kSamples = 2000;
 
 bool is_usable(const model::MapLandmark& landmark) {

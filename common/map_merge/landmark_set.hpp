@@ -1,4 +1,4 @@
-// The landmarks of one map, as the search for an overlap uses them.
+// The landmarks of one map, for the search of an overlap.
 #pragma once
 
 #include <cstdint>
@@ -15,28 +15,28 @@ struct UncertainLandmark {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
-  std::uint32_t index = 0;  ///< In the map.
+  std::uint32_t index = 0;  ///< Index in the map.
 
-  /// Per axis, in the mean of both [m^2].
+  /// Mean variance per axis [m^2].
   double variance_m2() const { return 0.5 * covariance_m2.trace(); }
 };
 
-/// The usable landmarks of a map, found by place. Not copied: it is large.
+/// The usable landmarks of a map with a spatial index. Not copyable, because it is large.
 class LandmarkSet {
  public:
-  /// Leaves out what is not finite or too far away. `unknown_sigma_m`: of a landmark without
-  /// covariance.
+  /// Leaves out landmarks that are not finite or too far away. `unknown_sigma_m`: sigma of a
+  /// landmark without covariance.
   LandmarkSet(std::span<const model::MapLandmark> landmarks, double unknown_sigma_m);
 
   /// All of them, in order of index.
   const std::vector<UncertainLandmark>& all() const { return landmarks_; }
-  /// Where they are, by their place in all().
+  /// Grid of positions; slots are indices in all().
   const constellation::PointGrid& grid() const { return grid_; }
   /// Usual distance between neighbours [m]: the side of a square that has one landmark.
   double spacing_m() const { return spacing_m_; }
-  /// How many lie within the radius around a point of this map's frame.
+  /// Number of landmarks within the radius around a point of this map's frame.
   std::size_t count_within(const Eigen::Vector2d& point_m, double radius_m) const;
-  /// The places in all() of the `count` nearest, the nearest first; ties by place.
+  /// Indices in all() of the `count` nearest, the nearest first; ties by index.
   std::vector<std::uint32_t> nearest(const Eigen::Vector2d& point_m, std::size_t count) const;
 
  private:

@@ -11,16 +11,17 @@
 namespace understory::map_merge {
 namespace {
 
-/// A landmark lies in the other map where that has so many landmarks ...
+/// A landmark is in the area of the other map if that has this many landmarks ...
 constexpr std::size_t kCovering = 6;
-/// ... within so many times its usual distance between neighbours.
+/// ... within this many times its usual distance between neighbours.
 constexpr double kCoveringSpacings = 2.5;
-/// Pairs that a motion is made of: they say nothing about it.
+/// Pairs that determine a motion: they are no evidence for it.
 constexpr double kPairsOfMotion = 3.0;
 
 double covering_radius(const LandmarkSet& set) { return kCoveringSpacings * set.spacing_m(); }
 
-/// Which landmarks of `set`, moved into the frame of `other`, lie in it.
+/// For each landmark of `set`, moved into the frame of `other`: whether it lies in the area of
+/// `other`.
 std::vector<bool> inside(const LandmarkSet& set, const geometry::SE2& other_T_set,
                          const LandmarkSet& other) {
   std::vector<bool> result;
@@ -36,7 +37,7 @@ std::size_t number_of(const std::vector<bool>& flags) {
   return static_cast<std::size_t>(std::ranges::count(flags, true));
 }
 
-/// Landmarks of both maps that may be one.
+/// Landmarks of both maps that may be the same.
 struct Candidate {
   double chi2 = 0.0;
   std::uint32_t first = 0;
@@ -53,7 +54,8 @@ class PairSearch {
       largest_m2_ = std::max(largest_m2_, one.covariance_m2.trace());
   }
 
-  /// Adds what the landmark may be; gives the landmarks that chance puts into its gate.
+  /// Adds the candidates of the landmark; returns the expected number of landmarks in its gate by
+  /// chance.
   double collect(std::uint32_t second, std::vector<Candidate>& candidates) const {
     const UncertainLandmark& one = second_.all()[second];
     const Eigen::Vector2d at = model_.first_T_second * one.position_m;
@@ -85,7 +87,7 @@ class PairSearch {
     candidates.push_back({chi2, first, second, off.norm()});
   }
 
-  /// Landmarks in the gate if those around stood anywhere.
+  /// Expected landmarks in the gate if the surrounding ones were uniformly distributed.
   double chance_at(const UncertainLandmark& one, const Eigen::Vector2d& at) const {
     const double radius_m = covering_radius(first_);
     const auto around = static_cast<double>(first_.count_within(at, radius_m));
@@ -99,10 +101,10 @@ class PairSearch {
   const LandmarkSet& second_;
   const DifferenceModel& model_;
   const AlignmentParameters& parameters_;
-  double largest_m2_ = 0.0;  ///< Of the first map's landmarks, both axes together.
+  double largest_m2_ = 0.0;  ///< Largest variance of the first map's landmarks, sum of both axes.
 };
 
-/// The best ones first, each landmark once.
+/// Selects pairs, the best first, each landmark once.
 std::vector<LandmarkPair> one_to_one(std::vector<Candidate> candidates, const LandmarkSet& first,
                                      const LandmarkSet& second) {
   std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
@@ -160,7 +162,7 @@ Pairing pair_up(const LandmarkSet& first, const LandmarkSet& second, const Diffe
   std::vector<Candidate> candidates;
   double chance = 0.0;
   for (std::uint32_t i = 0; i < is_shared.size(); ++i) {
-    // In a sparse corner there may be a pair, too; it says nothing about the motion.
+    // A sparse area may also have a pair; it is no evidence for the motion.
     const double expected = search.collect(i, candidates);
     if (is_shared[i]) chance += std::min(1.0, expected);
   }

@@ -1,4 +1,4 @@
-// Which landmarks of two maps are the same ones, if one map lies in the other as a motion says.
+// Pairs the landmarks of two maps, given the relative motion.
 #pragma once
 
 #include <vector>
@@ -8,41 +8,42 @@
 
 namespace understory::map_merge {
 
-/// The pairs of a motion, and what speaks for it.
+/// The pairs of a motion, and its bound on chance.
 struct Pairing {
   std::vector<LandmarkPair> pairs;  ///< One to one, by `second`; indices in LandmarkSet::all().
   std::size_t first_in_overlap = 0;
   std::size_t second_in_overlap = 0;
   std::size_t pairs_in_overlap = 0;
-  /// log10 of a bound on the probability that chance gives so many pairs to one motion.
+  /// log10 of a bound on the probability of as many pairs by chance for one motion.
   double log10_tail = 0.0;
 
-  /// Pairs over the landmarks in the overlap of the map that has fewer there.
+  /// Pairs / landmarks in the overlap, of the map with fewer there.
   double share() const;
 };
 
-/// What the difference between two landmarks, one of each map, may be. The maps' own errors are in
-/// part common to all their landmarks (the gauge, a drift): that part moves a map as a whole, and
-/// once the motion is known it is in no difference.
+/// Model of the difference between two landmarks, one of each map. Part of a map's errors is common
+/// to all its landmarks (the gauge, a drift): it moves the whole map, and at a known motion no
+/// difference contains it.
 struct DifferenceModel {
   geometry::SE2 first_T_second;
-  /// Of the common motion, about `centre_m` of the second map (x, y, theta; right perturbation).
+  /// Covariance of the common motion, about `centre_m` of the second map (x, y, theta; right
+  /// perturbation).
   Eigen::Matrix3d common = Eigen::Matrix3d::Zero();
   Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();
-  double least_m2 = 0.0;  ///< Smallest variance that is left for a landmark of its own.
-  double scale = 1.0;     ///< Of what is left, where more differs than the maps state.
+  double least_m2 = 0.0;  ///< Least independent variance of a landmark.
+  double scale = 1.0;     ///< Factor on the rest, where differences exceed the stated covariances.
 
-  /// As both maps state it, frame `first`.
+  /// Covariance stated by both maps, frame `first`.
   Eigen::Matrix2d stated(const UncertainLandmark& first, const UncertainLandmark& second) const;
   /// The part that is independent from landmark to landmark.
   Eigen::Matrix2d independent(const UncertainLandmark& first,
                               const UncertainLandmark& second) const;
-  /// Derivative of a landmark's place, frame `first`, by the motion about the centre.
+  /// Derivative of a landmark's position, frame `first`, by the motion about the centre.
   Eigen::Matrix<double, 2, 3> jacobian(const UncertainLandmark& second) const;
 };
 
-/// The nearest landmarks of one kind within the gate, the best pairs first. The error of the motion
-/// is not in the gate.
+/// The nearest landmarks of one kind within the gate, the best pairs first. The gate does not
+/// include the error of the motion.
 Pairing pair_up(const LandmarkSet& first, const LandmarkSet& second, const DifferenceModel& model,
                 const AlignmentParameters& parameters);
 

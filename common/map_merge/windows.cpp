@@ -8,25 +8,25 @@
 namespace understory::map_merge {
 namespace {
 
-/// Motions that go on to be verified, the most certain ones.
+/// Largest number of motions to verify, the most certain ones.
 constexpr std::size_t kMostHypotheses = 16;
-/// Fewest landmarks of a window that its motion explains.
+/// Fewest landmarks of a window explained by its motion.
 constexpr std::size_t kFewestInliers = 5;
-/// Sigmas of a window's motion, as a multiple of what its pairs alone say: the map may be bent.
+/// Factor on the sigmas of a window's motion from its pairs alone, because the map may be deformed.
 constexpr double kGenerous = 3.0;
-/// The share of a window's landmarks that its centre stands for.
+/// A window's centre covers one of this many parts of its landmarks.
 constexpr std::size_t kOverlapOfWindows = 3;
 
 constellation::LocaliseParameters search_parameters() {
   constellation::LocaliseParameters parameters;
-  // Neighbours in one map are not those in the other where each lacks landmarks.
+  // Neighbours differ between the maps where each lacks landmarks.
   parameters.neighbours = 8;
   parameters.expected_hit_ratio = 0.35;
   parameters.max_lookups = 100'000;
   return parameters;
 }
 
-/// A window's landmarks in their own middle, axes as in the map.
+/// A window's landmarks relative to their mean, axes as in the map.
 struct Window {
   Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();
   std::vector<constellation::ObservedPoint> points;
@@ -46,7 +46,7 @@ Window window_of(const LandmarkSet& set, const std::vector<std::uint32_t>& membe
   return window;
 }
 
-/// From the pairs of a window's best motion, accepted or not.
+/// A hypothesis from the pairs of a window's best motion, accepted or not.
 Hypothesis hypothesis_of(const constellation::ConstellationMap& map, const Window& window,
                          const constellation::Localisation& found) {
   geometry::RigidAlignment2 alignment;
@@ -69,7 +69,7 @@ Hypothesis hypothesis_of(const constellation::ConstellationMap& map, const Windo
           found.associations.size()};
 }
 
-/// Whether both put the window of the first one to the same place.
+/// Whether both move the window of the first one to the same place.
 bool is_same(const Hypothesis& a, const Hypothesis& b, double reach_m) {
   const Eigen::Vector3d between = (a.map_T_searched.mean.inverse() * b.map_T_searched.mean).Log();
   constexpr double kSame_m = 2.0;
@@ -77,7 +77,7 @@ bool is_same(const Hypothesis& a, const Hypothesis& b, double reach_m) {
          std::abs(between.z()) < 0.05;
 }
 
-/// The most certain ones, each motion once.
+/// The most certain hypotheses, each motion once.
 std::vector<Hypothesis> different_ones(std::vector<Hypothesis> all, const LandmarkSet& searched) {
   std::ranges::stable_sort(all, {}, &Hypothesis::log10_false_alarm);
   double reach_m = 0.0;

@@ -1,4 +1,4 @@
-// The search for an overlap without a prior: parts of one map, found in the other.
+// The search for an overlap without a prior: finds parts of one map in the other.
 #pragma once
 
 #include <cstddef>
@@ -10,33 +10,33 @@
 
 namespace understory::map_merge {
 
-/// A motion that a part of one map was found by.
+/// A motion at which a part of one map was found.
 struct Hypothesis {
-  /// map_T_searched; the covariance is that of the part's own pairs, generously.
+  /// map_T_searched; the covariance is that of the part's own pairs, enlarged.
   geometry::SE2WithCovariance map_T_searched;
-  double log10_false_alarm = 0.0;  ///< Of the part alone.
+  double log10_false_alarm = 0.0;  ///< Bound for the part alone.
   std::size_t inliers = 0;
 };
 
-/// The motions that windows gave, and how many were tried for them.
+/// The motions from windows, and the number of tried ones.
 struct WindowSearch {
   std::vector<Hypothesis> hypotheses;  ///< Different ones, the most certain first.
   std::size_t windows = 0;
   std::size_t tried = 0;
 };
 
-/// How windows are made.
+/// Size of windows.
 struct WindowSize {
   std::size_t landmarks = 0;
-  /// Landmarks near to each other are known to each other at least so well [m], per axis: what they
-  /// state beyond it is the error of a whole region.
+  /// Upper limit of the relative sigma of near landmarks [m], per axis: a larger stated sigma is a
+  /// common error of the region.
   double most_sigma_m = 0.0;
 };
 
-/// Covers `searched` with windows of so many neighbouring landmarks, each half over the next ones,
-/// and looks for each in `map`. Motions that no window alone is sure of are kept, too: whoever asks
-/// verifies them on all landmarks. `progress` is called after each window with the part of
-/// `searched` that is covered; what it throws ends the search.
+/// Covers `searched` with overlapping windows of neighbouring landmarks and searches each in `map`.
+/// Motions that are not certain by one window alone are kept too: the caller verifies them on all
+/// landmarks. `progress` is called after each window with the covered fraction of `searched`; an
+/// exception of it ends the search.
 WindowSearch search_windows(const constellation::ConstellationMap& map, const LandmarkSet& searched,
                             const WindowSize& size, const std::function<void(double)>& progress);
 
