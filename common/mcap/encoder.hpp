@@ -1,4 +1,4 @@
-// Values as MCAP serialises them.
+// Serialises values for MCAP.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace understory::mcap {
 
-/// The records of the specification that are written here.
+/// The records of the specification written here.
 enum class Opcode : std::uint8_t {
   kHeader = 0x01,
   kFooter = 0x02,
@@ -27,38 +27,38 @@ inline constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
 /// Opcode and length in front of a record's content [bytes].
 inline constexpr std::size_t kRecordHead = 9;
 
-/// Appends values to bytes ("Serialization"): integers little-endian, text behind its length.
+/// Appends values to bytes ("Serialization"): integers little-endian, text after its length.
 class Encoder {
  public:
-  /// One byte.
+  /// Appends one byte.
   void u8(std::uint8_t value) { bytes_.push_back(static_cast<char>(value)); }
-  /// Two bytes.
+  /// Appends two bytes.
   void u16(std::uint16_t value) { integer(value, 2); }
-  /// Four bytes.
+  /// Appends four bytes.
   void u32(std::uint32_t value) { integer(value, 4); }
-  /// Eight bytes; also a Timestamp [ns].
+  /// Appends eight bytes; also for a Timestamp [ns].
   void u64(std::uint64_t value) { integer(value, 8); }
-  /// A String, or Bytes with a length of 32 bits in front.
+  /// Appends a String, or Bytes after a length of 32 bits.
   void text(std::string_view value) {
     u32(static_cast<std::uint32_t>(value.size()));
     raw(value);
   }
-  /// The bytes alone.
+  /// Appends the bytes alone.
   void raw(std::string_view value) { bytes_.append(value); }
-  /// Opcode and length of a record whose content of `size` bytes follows.
+  /// Appends opcode and length of a record; its content of `size` bytes must follow.
   void head(Opcode opcode, std::uint64_t size) {
     u8(static_cast<std::uint8_t>(opcode));
     u64(size);
   }
-  /// A whole record.
+  /// Appends a complete record.
   void record(Opcode opcode, std::string_view content) {
     head(opcode, content.size());
     raw(content);
   }
 
-  /// All so far.
+  /// All bytes so far.
   const std::string& bytes() const { return bytes_; }
-  /// Forgets all, keeps the memory.
+  /// Clears the bytes, keeps the memory.
   void clear() { bytes_.clear(); }
 
  private:

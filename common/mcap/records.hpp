@@ -1,5 +1,5 @@
-// What an MCAP file holds, and each record's content as bytes. Names are those of the
-// specification ("Records").
+// Contents of an MCAP file, and each record's content as bytes. Names as in the specification
+// ("Records").
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,11 @@
 
 namespace understory::mcap {
 
-/// How the messages of a channel are built.
+/// Schema of a channel's messages.
 struct Schema {
   std::string name;      ///< For example foxglove.Log.
   std::string encoding;  ///< For example jsonschema.
-  std::string data;      ///< In that encoding.
+  std::string data;      ///< The schema in this encoding.
 };
 
 /// A stream of messages.
@@ -30,33 +30,33 @@ struct Channel {
 struct Message {
   std::uint16_t channel_id = 0;
   std::uint32_t sequence = 0;
-  std::uint64_t log_time_ns = 0;      ///< When it was recorded.
-  std::uint64_t publish_time_ns = 0;  ///< When it was published.
+  std::uint64_t log_time_ns = 0;      ///< Time of recording.
+  std::uint64_t publish_time_ns = 0;  ///< Time of publication.
   std::string_view data;
 };
 
-/// Earliest and latest log time; of nothing: zero.
+/// Earliest and latest log time; zero without messages.
 struct TimeSpan {
   std::uint64_t start_ns = 0;
   std::uint64_t end_ns = 0;
 
-  /// Widens it; `is_first`: nothing is in it yet.
+  /// Extends it; `is_first`: it is still empty.
   void take(std::uint64_t time_ns, bool is_first);
 };
 
-/// Where a chunk is and what is in it.
+/// Place and content of a chunk.
 struct ChunkIndex {
   TimeSpan time;
-  std::uint64_t start = 0;  ///< Of the chunk's record in the file [bytes].
+  std::uint64_t start = 0;  ///< Offset of the chunk's record in the file [bytes].
   std::uint64_t length = 0;
-  std::map<std::uint16_t, std::uint64_t> message_index_offsets;  ///< Channel -> place in the file.
+  std::map<std::uint16_t, std::uint64_t> message_index_offsets;  ///< Channel -> offset in the file.
   std::uint64_t message_index_length = 0;
   std::string compression;
   std::uint64_t compressed_size = 0;
   std::uint64_t uncompressed_size = 0;
 };
 
-/// How much is in the file.
+/// Counts of the file's content.
 struct Statistics {
   std::uint64_t message_count = 0;
   std::uint16_t schema_count = 0;
@@ -66,7 +66,7 @@ struct Statistics {
   std::map<std::uint16_t, std::uint64_t> channel_message_counts;
 };
 
-/// Log time and place in the uncompressed chunk of each message of one channel.
+/// Log time and offset in the uncompressed chunk of each message of one channel.
 using MessageIndex = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
 
 /// Content of a Schema record.

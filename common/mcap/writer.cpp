@@ -14,7 +14,7 @@
 namespace understory::mcap {
 namespace {
 
-/// CRC-32 as the specification means it (that of zlib and PNG), gone on with.
+/// CRC-32 of the specification (that of zlib and PNG), continued from `crc`.
 std::uint32_t crc_after(std::uint32_t crc, std::string_view bytes) {
   return static_cast<std::uint32_t>(
       ::crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
@@ -85,21 +85,21 @@ class Writer::Impl {
   const Statistics& statistics() const { return statistics_; }
 
  private:
-  /// The chunk that is being filled.
+  /// The chunk being filled.
   struct OpenChunk {
     Encoder records;
     TimeSpan time;
-    std::map<std::uint16_t, MessageIndex> indexes;  ///< By channel.
+    std::map<std::uint16_t, MessageIndex> indexes;  ///< Index by channel.
   };
 
-  /// Is in the file from its first use on.
+  /// Written to the file at its first use.
   template <class T>
   struct Announced {
     T value;
     bool is_in_file = false;
   };
 
-  /// The channel and its schema come before its first message.
+  /// Writes the channel and its schema before its first message.
   void introduce(std::uint16_t channel_id) {
     auto& channel = channels_.at(channel_id - std::size_t{1});
     if (channel.is_in_file) return;
@@ -159,7 +159,8 @@ class Writer::Impl {
     return index;
   }
 
-  /// Schemas, channels, statistics and chunk indexes, where each group is, and the footer.
+  /// Writes schemas, channels, statistics and chunk indexes, the place of each group, and the
+  /// footer.
   void append_summary() {
     Encoder schemas;
     for (std::size_t i = 0; i < schemas_.size(); ++i) {
@@ -217,7 +218,7 @@ class Writer::Impl {
 
   WriterOptions options_;
   io::WholeFile file_;
-  std::uint32_t crc_ = 0;  ///< Of the data section, then of the summary.
+  std::uint32_t crc_ = 0;  ///< CRC of the data section, then of the summary.
   std::vector<Announced<Schema>> schemas_;
   std::vector<Announced<Channel>> channels_;
   OpenChunk chunk_;
