@@ -1,4 +1,4 @@
-// Which members of the values that stages exchange go into a saved state.
+// Members of exchanged values in a saved state.
 #pragma once
 
 #include "common/model/ekf_output.hpp"

@@ -10,46 +10,47 @@
 namespace understory::model {
 namespace {
 
-/// Noise: a scan is compared with one so many scans before it; neighbours share more of their
-/// errors.
+/// Lag for the noise: a scan is compared with one this many scans before; adjacent scans share more
+/// of their errors.
 constexpr std::size_t kLag = 4;
-/// Pairs without which the motion leaves too little over.
+/// Least number of pairs, so that the motion leaves enough degrees of freedom.
 constexpr std::size_t kLeastPairs = 4;
-/// Pairs that are used; of more, every second, third, ...
+/// Largest number of pairs; of more, every second, third, ... is used.
 constexpr std::size_t kMostPairs = 64;
 /// Limits of the bins of range [m].
 constexpr std::array<double, 3> kRangeLimits_m = {10.0, 20.0, 40.0};
-/// chi^2 of 2 degrees of freedom that counts at most: a wrong pair must not decide.
+/// Upper limit of chi^2 with 2 degrees of freedom, so that a wrong pair does not dominate.
 constexpr double kMostChi2 = 9.0;
-/// Degrees of freedom that are remembered for a kind and range, and of a kind for a lag: how errors
-/// fade depends on the sensor and changes less.
+/// Memory in degrees of freedom for a kind and range, and for a kind and lag: the correlation of
+/// errors depends on the sensor and changes less.
 constexpr double kMemory = 600.0;
 constexpr double kLagMemory = 8000.0;
-/// Standard deviations of chance beyond which a lag shows a correlation.
+/// Standard deviations beyond which a lag shows a correlation.
 constexpr double kLagSigmas = 6.0;
-/// Growth of the variogram to the longest lag from which on errors outlast what is compared.
+/// Growth of the variogram to the longest lag above which errors last longer than the compared
+/// lags.
 constexpr double kMostGrowth = 0.15;
 /// Weight of the stated variance, and of the whole kind for one range [degrees of freedom].
 constexpr double kStatedWeight = 4.0;
 constexpr double kKindWeight = 40.0;
-/// A factor counts where its logarithm is so many standard deviations from zero.
+/// A factor is used if its logarithm is this many standard deviations from zero.
 constexpr double kSigmas = 4.0;
-/// Passes of the fit; the second starts at the optimum but for rounding and wrong pairs.
+/// Passes of the fit; the second starts at the optimum except for rounding and wrong pairs.
 constexpr int kPasses = 2;
-/// Least variance that divides [m^2].
+/// Least variance in a division [m^2].
 constexpr double kLeast_m2 = 1e-12;
-/// A scan whose mean factor is so much larger or smaller, and by so many standard deviations of its
-/// logarithm, shows other noise; what was learned before then counts by this share.
+/// A scan shows other noise if its mean factor differs by this ratio and by this many standard
+/// deviations of its logarithm; earlier sums are then multiplied by kAfterChange.
 constexpr double kOther = 2.0;
 constexpr double kOtherSigmas = 4.0;
 constexpr double kAfterChange = 0.3;
-/// Change of the logarithm of a scan's mean factor that is noted.
+/// Change of the logarithm of a scan's mean factor that counts as a change.
 constexpr double kChanged = 0.69;  // doubled or halved
 /// Factors of the variance to try: four times the sigma, a quarter and half of it.
 constexpr std::array<double, 3> kTries = {16.0, 1.0 / 16.0, 1.0 / 4.0};
-/// Of a rescaled scan's chi^2 by its degrees of freedom. Pairs by chance have 2 and more.
+/// Upper limit of a rescaled scan's chi^2 / degrees of freedom. Pairs by chance have 2 and more.
 constexpr double kExplained = 1.4;
-/// A pair of which the motion takes nearly all says nothing.
+/// A pair is skipped if the motion uses nearly all its degrees of freedom.
 constexpr double kLeastShare = 0.1;
 
 /// d(then_T_now * now) / d(then_T_now), right perturbation, 2 x 3.
@@ -66,7 +67,7 @@ bool is_other_noise(double chi2, double expected, double degrees) {
   return change > std::max(std::log(kOther), kOtherSigmas * std::sqrt(2.0 / degrees));
 }
 
-/// Every k-th of too many.
+/// Every k-th element if there are too many.
 template <class T>
 void thin_out(std::vector<T>& values, std::size_t most) {
   if (values.size() <= most) return;
@@ -123,7 +124,7 @@ void DetectionNoise::add(const LandmarkScan& scan, std::span<const std::uint64_t
   note_changes();
 }
 
-/// Notes that the last scan's factors, in their mean, are others than before.
+/// Registers a change of the mean of the last scan's factors.
 void DetectionNoise::note_changes() {
   scans_since_told_ = std::min(scans_since_told_ + 1, kSettled);
   const std::vector<Seen>& seen = recent_.back().seen;
@@ -149,7 +150,7 @@ void DetectionNoise::learn_lag(std::size_t lag) {
   const Fit fit = fitted_motion(pairs);
   if (!fit.covariance.allFinite()) return;
 
-  // By the noise as learned: kinds and ranges are alike then.
+  // Relative to the learned noise, so that kinds and ranges are comparable.
   for (const Pair& pair : pairs) {
     Sums& sums = by_lag_[pair.bin / kRanges][lag];
     const auto [chi2, degrees] = left_over(pair, fit, sums.mean());
@@ -159,9 +160,9 @@ void DetectionNoise::learn_lag(std::size_t lag) {
   for (std::size_t kind = 0; kind < kKinds; ++kind) by_lag_[kind][lag].forget_beyond(kLagMemory);
 }
 
-/// What a motion leaves of a pair, by the noise as learned so far, and of how many degrees of
-/// freedom: the motion takes a share of each. A residual that is large beside the `usual` one
-/// counts as kMostChi2 of it; the mean allows for that.
+/// The residual of a pair after a motion, by the noise learned so far, and its degrees of freedom:
+/// the motion uses a share of them. A residual much larger than the `usual` one is limited to
+/// kMostChi2 of it; the mean is corrected for this.
 DetectionNoise::Sums DetectionNoise::left_over(const Pair& pair, const Fit& fit,
                                                double usual) const {
   static const double kCut = 1.0 - std::exp(-0.5 * kMostChi2);
@@ -173,7 +174,7 @@ DetectionNoise::Sums DetectionNoise::left_over(const Pair& pair, const Fit& fit,
   return {share * std::min(residual.chi2 / share, usual * kMostChi2) / kCut, degrees};
 }
 
-/// The oldest of so many scans before the last one that has enough in common with it.
+/// The oldest among the `most_scans` scans before the last one with enough common landmarks.
 std::optional<DetectionNoise::Common> DetectionNoise::common_with_last(
     std::size_t most_scans) const {
   if (recent_.empty()) return std::nullopt;
@@ -204,7 +205,7 @@ void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
     added[pair.bin].degrees += left.degrees;
   }
 
-  // The memory is bounded: what is older counts less, and little where this scan is quite
+  // The memory is bounded: older scans have less weight, and little where this scan is very
   // different.
   Sums all;
   double expected = 0.0;
@@ -213,8 +214,8 @@ void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
     all.degrees += added[bin].degrees;
     expected += estimates_[bin] * added[bin].degrees;
   }
-  // Scans before and after a change of all noise have no lag between them. One range alone is other
-  // by chance too often.
+  // Lags are not compared across a change of all noise. One range alone differs too often by
+  // chance.
   if (is_other_noise(all.chi2, expected, all.degrees)) since_other_ = 0;
   for (std::size_t bin = 0; bin < sums_.size(); ++bin) {
     Sums& sums = sums_[bin];
@@ -294,7 +295,7 @@ double DetectionNoise::repetition(LandmarkKind kind) const {
   return white_noise_power(variogram(kind), kLag, kLagSigmas);
 }
 
-/// Errors whose memory is longer than what is compared would pass for small ones.
+/// Errors with a longer memory than the compared lags would appear small.
 bool DetectionNoise::may_shrink(LandmarkKind kind) const {
   return !outlasts(variogram(kind), kMostGrowth);
 }
@@ -323,7 +324,7 @@ double DetectionNoise::factor_of(std::size_t bin, bool may_shrink) const {
   if (learned < parameters_.replace_above && learned > below) return 1.0;
   if (learned < 1.0 && !may_shrink) return 1.0;
 
-  // By chance?
+  // Is the factor explained by chance?
   const std::size_t first = bin / kRanges * kRanges;
   double degrees = kStatedWeight;
   for (std::size_t i = first; i < first + kRanges; ++i) degrees += sums_[i].degrees;

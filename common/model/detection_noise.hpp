@@ -1,4 +1,4 @@
-// The noise of detections as the scans themselves show it, beside what their sender states.
+// The noise of detections, estimated from the scans themselves.
 #pragma once
 
 #include <array>
@@ -15,15 +15,15 @@
 
 namespace understory::model {
 
-/// When stated covariances are replaced.
+/// Limits for replacing stated covariances.
 struct DetectionNoiseParameters {
   bool learn = true;           ///< False: covariances stay as stated.
-  double replace_above = 1.5;  ///< Factor of the variance from which understated ones grow.
-  double replace_below = 0.6;  ///< Factor of the variance below which overstated ones shrink.
-  double replace_corners_below = 0.6;  ///< The same of corners.
+  double replace_above = 1.5;  ///< Factor of the variance above which stated ones are enlarged.
+  double replace_below = 0.6;  ///< Factor of the variance below which stated ones are reduced.
+  double replace_corners_below = 0.6;  ///< The same for corners.
 };
 
-/// How the vehicle moved between two scans, by landmarks that both observed and nothing else.
+/// The vehicle's motion between two scans, from common landmarks alone.
 struct ScanMotion {
   Utime then_utime = 0;
   Utime now_utime = 0;
@@ -36,36 +36,36 @@ struct ScanMotion {
   }
 };
 
-/// Learns by which factor the variance of detections differs from what LANDMARKS states, for each
-/// kind and range.
+/// Learns the factor between the true variance of detections and the variance in LANDMARKS, for
+/// each kind and range.
 ///
 /// Two scans a few scans apart that observed the same landmarks differ by a rigid motion and by
-/// noise. What the best motion leaves is the noise alone: no odometry, no map and no filter takes
-/// part, so that their errors do not pass for noise.
+/// noise. The residual of the best motion is noise alone: no odometry, map or filter is used, so
+/// that their errors are not counted as noise.
 ///
-/// Errors of neighbouring scans are correlated where their clouds overlap or a trunk is no circle.
-/// The residual of a pair grows with the lag between its scans then (a variogram, Matheron 1963):
-/// half the mean square at lag h is the variance less the autocovariance at h. The factor is that
-/// of white noise of the same power at frequency zero: the variance plus twice the sum of all
-/// autocovariances. N scans weighted by it state the uncertainty that their mean truly has. Errors
-/// that all scans share (an offset of the mounting, the scale of ranges) are not seen; that is why
-/// a statement is trusted as long as the scans do not contradict it clearly, and why variances
-/// do not shrink where errors outlast the lags that are compared.
+/// Errors of adjacent scans are correlated where their clouds overlap or a trunk is not a circle.
+/// The residual of a pair then grows with the lag between its scans (a variogram, Matheron 1963):
+/// half the mean square at lag h is the variance less the autocovariance at h. The factor belongs
+/// to white noise of the same power at frequency zero: the variance plus twice the sum of all
+/// autocovariances. With it, the mean of N scans has its true covariance. Errors common to all
+/// scans (an offset of the mounting, the scale of ranges) are not observable. Therefore stated
+/// covariances are kept unless the scans contradict them clearly, and variances are not reduced
+/// where errors last longer than the compared lags.
 class DetectionNoise {
  public:
-  /// The stated covariances hold.
+  /// Starts with the stated covariances.
   explicit DetectionNoise(const DetectionNoiseParameters& parameters = {})
       : parameters_(parameters) {}
 
-  /// Takes a scan with its covariances as stated. `tracks`: the landmark of each detection, by any
-  /// number that lasts from scan to scan; 0 = unknown. Cost O(n log n).
+  /// Takes a scan with its stated covariances. `tracks`: a number for the landmark of each
+  /// detection, constant from scan to scan; 0 = unknown. Cost O(n log n).
   void add(const LandmarkScan& scan, std::span<const std::uint64_t> tracks);
-  /// The motion over up to 20 scans to the last one; nothing where they have too little in common.
-  /// Cost: a fit, as in add().
+  /// The motion over up to 20 scans to the last one; none where they have too few common landmarks.
+  /// Cost: one fit, as in add().
   std::optional<ScanMotion> motion() const { return motion_over(kLongLag); }
-  /// The same over up to so many scans.
+  /// The same over up to `most_scans` scans.
   std::optional<ScanMotion> motion_over(std::size_t most_scans) const;
-  /// The motion from the scan before the last one to that.
+  /// The motion from the last scan but one to the last.
   std::optional<ScanMotion> step() const { return motion_over(1); }
   /// Detections of the last scan that can be found again.
   std::size_t seen_last() const { return recent_.empty() ? 0 : recent_.back().seen.size(); }
@@ -73,20 +73,21 @@ class DetectionNoise {
   double factor(LandmarkKind kind, double range_m) const;
   /// The scan with its covariances in the plane multiplied by their factors.
   LandmarkScan corrected(LandmarkScan scan) const;
-  /// True until enough scans were compared to contradict what is stated.
+  /// True until enough scans were compared to contradict the stated covariances.
   bool is_new() const;
-  /// Factors of the variance to try where too little is learned: as stated it may be too small to
-  /// find any landmark again, or so large that each fits several. Empty once enough is learned.
+  /// Factors of the variance to try while too little is learned: the stated variance may be too
+  /// small to find any landmark again, or so large that each detection fits several. Empty when
+  /// enough is learned.
   std::span<const double> tries() const;
   /// The scan with covariances for such a try.
   static LandmarkScan rescaled(LandmarkScan scan, double factor);
-  /// Whether noise of that size explains what the scan has in common with the one before it: pairs
-  /// by chance fill a wide gate evenly, noise does not.
+  /// Whether noise of this size explains the pairs with the previous scan: pairs by chance fill a
+  /// wide gate evenly, noise does not.
   bool explains(const LandmarkScan& scan, std::span<const std::uint64_t> tracks,
                 double factor) const;
-  /// How many detections of this scan are in the one before it.
+  /// Number of detections of this scan that are also in the previous scan.
   std::size_t in_common(const LandmarkScan& scan, std::span<const std::uint64_t> tracks) const;
-  /// Tracking broke off: what little was learned may be from wrong pairs.
+  /// Call it after a loss of tracking: the little learned so far may be from wrong pairs.
   void forget_while_new() {
     if (!is_new()) return;
     sums_ = {};
@@ -94,12 +95,13 @@ class DetectionNoise {
   }
   /// True where the factor of any kind and range is not 1.
   bool is_misstated() const;
-  /// True while it is so and the factors are not settled: less than 200 scans ago their mean over a
-  /// scan doubled or halved. Afterwards what is stated is wrong, and what is used is right.
+  /// True while is_misstated() and the factors are not settled: their mean over a scan doubled or
+  /// halved less than 200 scans ago. Later the stated covariances are wrong, but the used ones are
+  /// right.
   bool is_adjusting() const { return is_misstated() && scans_since_told_ < kSettled; }
-  /// How much more a detection's variance counts since its error is correlated with those of the
-  /// scans around: white noise of the same power over the variance between scans four apart. 1 for
-  /// white noise and until enough is learned.
+  /// Factor on a detection's variance for the correlation with adjacent scans: white noise of the
+  /// same power over the variance between scans four apart. 1 for white noise and until enough is
+  /// learned.
   double repetition(LandmarkKind kind) const;
 
   /// Members of a saved state; see common/state. The parameters are configuration.
@@ -111,7 +113,7 @@ class DetectionNoise {
   }
 
  private:
-  /// Scans over which motion() goes: the longer the way, the more it shows.
+  /// Scans covered by motion(): a longer distance contains more information.
   static constexpr std::size_t kLongLag = 20;
 
   /// Lags [scans] at which residuals are compared; the last one is within kLongLag.
@@ -136,7 +138,7 @@ class DetectionNoise {
     return factors;
   }
 
-  /// A detection of an earlier scan.
+  /// A detection of a scan.
   struct Seen {
     std::uint64_t track = 0;
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
@@ -154,10 +156,10 @@ class DetectionNoise {
     Seen now;
     std::size_t bin = 0;
   };
-  /// What a motion leaves of a pair, by the noise as learned so far.
+  /// Residual of a pair after a motion, by the noise learned so far.
   struct Residual {
     double chi2 = 0.0;
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< About the motion.
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< Information on the motion.
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   };
   /// The motion between two scans.
@@ -165,14 +167,14 @@ class DetectionNoise {
     geometry::SE2 then_T_now;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   };
-  /// Of the squared residuals by their stated covariances.
+  /// Sums of the squared residuals by their stated covariances.
   struct Sums {
     double chi2 = 0.0;
-    double degrees = 0.0;  ///< Of freedom.
+    double degrees = 0.0;  ///< Degrees of freedom.
 
     /// 1 until a few scans are known.
     double mean() const { return (kFewScans + chi2) / (kFewScans + degrees); }
-    /// What is older counts less.
+    /// Reduces the weight of older scans.
     void forget_beyond(double memory) {
       if (degrees <= memory) return;
       chi2 *= memory / degrees;
@@ -185,7 +187,7 @@ class DetectionNoise {
     }
   };
 
-  /// The detections of one scan that can be found again, in order of track.
+  /// The detections of one scan that can be found again, sorted by track.
   struct SeenScan {
     Utime utime = 0;
     std::vector<Seen> seen;
@@ -196,7 +198,7 @@ class DetectionNoise {
     }
   };
 
-  /// What a scan has in common with one before it.
+  /// Common landmarks of a scan and an earlier one.
   struct Common {
     Utime then_utime = 0;
     std::vector<Pair> pairs;
@@ -224,9 +226,8 @@ class DetectionNoise {
   std::array<Sums, kBins> sums_{};
   /// Of residuals at each lag, by their noise as learned in `sums_`.
   std::array<std::array<Sums, kLags.size()>, kKinds> by_lag_{};
-  std::size_t since_other_ = 0;  ///< Scans since the noise was quite different.
-  /// Logarithm of the mean factor of the scan that had last doubled or halved it, and scans
-  /// since.
+  std::size_t since_other_ = 0;  ///< Scans since the noise changed strongly.
+  /// Logarithm of the mean factor at the last scan that doubled or halved it, and scans since then.
   double told_ = 0.0;
   std::size_t scans_since_told_ = 0;
   std::deque<SeenScan> recent_;  ///< The last scans, the newest at the end.

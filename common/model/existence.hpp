@@ -1,4 +1,4 @@
-// Whether the landmarks of a map are still there.
+// Existence of the landmarks of a map.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,12 @@
 
 namespace understory::model {
 
-/// Of one landmark.
+/// Existence of one landmark.
 struct LandmarkExistence {
   LandmarkId id = 0;
-  double probability = 1.0;  ///< That it exists.
-  bool is_in_use = true;     ///< False: taken for gone. Not to be used, but kept and looked for.
+  double probability = 1.0;  ///< Probability that it exists.
+  /// False: judged as removed. It is not used, but still stored and expected in view.
+  bool is_in_use = true;
   bool operator==(const LandmarkExistence&) const = default;
 
   /// Members of a saved state; see common/state.
@@ -25,27 +26,27 @@ struct LandmarkExistence {
 
 /// Channel EXISTENCE.
 struct Existence {
-  Utime utime = 0;  ///< Of the keyframe.
+  Utime utime = 0;  ///< Stamp of the keyframe.
   std::uint64_t sequence = 0;
   std::uint32_t map_id = 1;
-  bool is_whole = false;                     ///< These are all whose probability is known.
+  bool is_whole = false;  ///< `landmarks` are all landmarks with a known probability.
   std::vector<LandmarkExistence> landmarks;  ///< In order of id.
   std::uint32_t known = 0;                   ///< Landmarks whose probability is known ...
-  std::uint32_t unused = 0;                  ///< ... and those of them that are taken for gone.
-  /// Of the landmarks that should have been seen on the last metres, those that were not; 0 to 1.
+  std::uint32_t unused = 0;                  ///< ... and those of them judged as removed.
+  /// Share of unseen ones among the landmarks expected in view on the last metres; 0 to 1.
   double missing_share = 0.0;
-  double new_share = 0.0;  ///< Of what was seen there, that which is new to the map; 0 to 1.
+  double new_share = 0.0;  ///< Share of new ones among the landmarks seen there; 0 to 1.
   bool is_mapping_needed = false;
 };
 
-/// Channel EXISTENCE_STATE: what the tracker needs to go on with these landmarks later.
+/// Channel EXISTENCE_STATE: the tracker's state to continue with these landmarks later.
 struct ExistenceState {
   Utime utime = 0;
   std::uint64_t sequence = 0;
   std::uint32_t map_id = 1;
   std::vector<LandmarkExistence> landmarks;  ///< In order of id.
-  std::string model;   ///< What was learned of detector and world, for all landmarks.
-  std::string states;  ///< The same number of bytes for each landmark, in their order.
+  std::string model;   ///< Learned values of detector and world, for all landmarks.
+  std::string states;  ///< Equal number of bytes for each landmark, in the order of `landmarks`.
 
   /// The bytes of landmark `i` of `landmarks`.
   std::string state_of(std::size_t i) const {

@@ -13,10 +13,10 @@ namespace understory::model {
 struct GnssFix {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  Eigen::Vector2d east_north_m = Eigen::Vector2d::Zero();  ///< From the recording's origin.
-  double sigma_m = 0.0;                                    ///< Per axis; 0 = unknown.
-  std::optional<Eigen::Vector2d> velocity_mps = {};        ///< East, north.
-  double velocity_sigma_mps = 0.0;                         ///< Per axis; 0 = unknown.
+  Eigen::Vector2d east_north_m = Eigen::Vector2d::Zero();  ///< Relative to the recording's origin.
+  double sigma_m = 0.0;                              ///< Standard deviation per axis; 0 = unknown.
+  std::optional<Eigen::Vector2d> velocity_mps = {};  ///< East, north.
+  double velocity_sigma_mps = 0.0;                   ///< Standard deviation per axis; 0 = unknown.
 };
 
 }  // namespace understory::model

@@ -37,7 +37,7 @@ void HeldMap::take(const WholeMap& map) {
 }
 
 void HeldMap::take(const MapDelta& delta) {
-  // A map's first change; its first update may have come before it.
+  // A map's first change; its first update may have arrived before it.
   const bool is_first = delta.base_version == 0;
   if (is_first && (!map_ || map_->version != 0)) start();
   if (!map_ || delta.version <= map_->version) return;
@@ -95,7 +95,7 @@ void HeldMap::take(const MapCorrection& correction) {
   }
 }
 
-/// Out of the submap that it was in.
+/// Removes the landmark from its submap.
 void HeldMap::comes_back(LandmarkId id) {
   const auto found = away_of_.find(id);
   if (found == away_of_.end()) return;
@@ -120,7 +120,7 @@ std::optional<WholeMap> HeldMap::whole() const {
     }
   }
 
-  // Keyframes that came back may be in both.
+  // Keyframes taken back may be in both.
   std::ranges::sort(whole.landmarks, {}, &MapLandmark::id);
   std::ranges::stable_sort(whole.keyframes, {}, &KeyframePose::utime);
   const auto twice = std::unique(

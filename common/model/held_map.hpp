@@ -1,4 +1,4 @@
-// What a listener has of a mapper's map.
+// A listener's copy of a mapper's map.
 #pragma once
 
 #include <cstdint>
@@ -11,36 +11,37 @@
 
 namespace understory::model {
 
-/// `landmarks` (in order of id) as a holder has them after `delta`: in order of id again.
-/// O(changed * log(map)), and O(map) for each that is put in or taken out before the end.
+/// Applies `delta` to `landmarks` (in order of id before and after). O(changed * log(map)), and
+/// O(map) for each insertion or removal before the end.
 std::vector<MapLandmark> with_delta(std::vector<MapLandmark> landmarks, const MapDelta& delta);
 
-/// The map by MAP, MAP_DELTA and SLAM_UPDATE, in the order in which they were published. MAP comes
-/// rarely: landmarks follow every MAP_DELTA, keyframes of the time since MAP have the pose of their
-/// SLAM_UPDATE. A map that starts is held from its first MAP_DELTA on, without any MAP.
+/// The map from MAP, MAP_DELTA and SLAM_UPDATE in their order of publication. MAP is rare:
+/// landmarks follow every MAP_DELTA, and keyframes since the last MAP have the pose of their
+/// SLAM_UPDATE. A new map is available from its first MAP_DELTA on, without a MAP.
 class HeldMap {
  public:
-  /// Takes the whole map; one that is cut to bounds is passed over.
+  /// Takes the whole map; a map cut to bounds is skipped.
   void take(const WholeMap& map);
-  /// Takes what changed. One with an older version is passed over; one that builds on a version
-  /// that is not held is counted as missed, and taken.
+  /// Takes a change. One with an older version is skipped; one with another base version than the
+  /// stored one is applied and counted as missed.
   void take(const MapDelta& delta);
-  /// Takes an accepted keyframe's pose; the update that starts a map ends the one before.
+  /// Takes an accepted keyframe's pose; an update that starts a map ends the previous map.
   void take(const MapUpdate& update);
 
-  /// Takes what the mapper handed over: it is in MAP and MAP_DELTA no more, unless it comes back.
+  /// Takes a submap handed over by the mapper: its content is no longer in MAP and MAP_DELTA unless
+  /// the mapper takes it back.
   void take(const Submap& submap);
-  /// Takes where the submaps are.
+  /// Takes the poses of the submaps.
   void take(const MapCorrection& correction);
 
-  /// What the mapper holds of the map and what it handed over; a landmark's covariance in a submap
-  /// is relative to that. O(map).
+  /// The part in the mapper's memory and the submaps handed over; a landmark's covariance in a
+  /// submap is relative to the submap. O(map).
   std::optional<WholeMap> whole() const;
-  /// What the mapper holds itself; none before the first whole one, or before a map has started.
+  /// The part in the mapper's memory; none before the first MAP and before the start of a map.
   const std::optional<WholeMap>& map() const { return map_; }
-  /// Whether a MAP was taken since the map started: its keyframes are those of the mapper.
+  /// Whether a MAP was taken since the start of the map: then its keyframes equal the mapper's.
   bool has_whole() const { return has_whole_; }
-  /// How often changes were missing since the last MAP: some landmarks may be old.
+  /// Number of missing changes since the last MAP: some landmarks may be outdated.
   std::uint64_t missed() const { return missed_; }
 
  private:
@@ -57,7 +58,7 @@ class HeldMap {
   bool has_whole_ = false;
   std::uint64_t missed_ = 0;
   std::map<SubmapId, Away> away_;
-  std::map<LandmarkId, SubmapId> away_of_;  ///< Those in `away_`.
+  std::map<LandmarkId, SubmapId> away_of_;  ///< The submap of each landmark in `away_`.
 };
 
 }  // namespace understory::model

@@ -8,8 +8,8 @@
 
 namespace understory::model {
 
-/// Channel IMU in frame `vehicle` (x forward, y left, z up); channel RAW_IMU in frame `sensor`, as
-/// the unit gives it.
+/// Channel IMU in frame `vehicle` (x forward, y left, z up); channel RAW_IMU in frame `sensor`,
+/// uncorrected.
 struct ImuSample {
   Utime utime = 0;
   std::uint64_t sequence = 0;

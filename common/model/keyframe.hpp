@@ -1,4 +1,4 @@
-// Local landmarks, de-noised from several scans: what the keyframer hands to the mapper.
+// Local landmarks, de-noised from several scans: the keyframer's output to the mapper.
 #pragma once
 
 #include <optional>
@@ -12,23 +12,23 @@ namespace understory::model {
 /// One landmark of a keyframe, in the frame of the keyframe's `centre`.
 struct KeyframeLandmark {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `centre`.
-  /// D: the uncertainty by this landmark's own detections, independent between landmarks.
+  /// D: covariance from this landmark's own detections, independent between landmarks.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
   double radius_m = 0.0;                ///< 0 where unknown.
-  std::uint16_t observation_count = 0;  ///< Detections that it was estimated from.
+  std::uint16_t observation_count = 0;  ///< Number of detections in its estimate.
   LandmarkKind kind = LandmarkKind::kTrunk;
 };
 
 /// One scan that went into a keyframe.
 struct KeyframeMember {
   Utime utime = 0;
-  std::uint64_t sequence = 0;  ///< Of the LANDMARKS message.
+  std::uint64_t sequence = 0;  ///< Sequence of the LANDMARKS message.
   geometry::SE2 centre_T_vehicle;
-  /// Of `centre_T_vehicle` (right perturbation; m, rad): the uncertainty by this scan's detections.
+  /// Covariance of `centre_T_vehicle` (right perturbation; m, rad) from this scan's detections.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
-/// A detection that a landmark of a keyframe was made from.
+/// A detection in a landmark of a keyframe.
 struct KeyframeDetection {
   std::uint32_t member = 0;     ///< Index in Keyframe::members.
   std::uint32_t detection = 0;  ///< Index in LandmarkScan::detections of that scan.
@@ -42,20 +42,20 @@ struct KeyframeDetection {
 /// first member) in that frame has `Sigma_base`, the covariance of members[0]. In the base's frame
 /// the landmarks' joint covariance is D + J Sigma_base J^T.
 struct Keyframe {
-  Utime utime = 0;                      ///< Of the base scan.
+  Utime utime = 0;                      ///< Stamp of the base scan.
   std::uint64_t sequence = 0;           ///< Counts keyframes.
-  FieldOfView field_of_view;            ///< Of the scans.
+  FieldOfView field_of_view;            ///< Field of view of the scans.
   std::vector<KeyframeMember> members;  ///< In order of time; members[0] is the base.
   std::vector<KeyframeLandmark> landmarks;
-  /// Motion from the previous keyframe's base to this one, as the keyframer tracked it; none after
-  /// a gap. It is estimated from the same detections: for gating and linearisation, never a
-  /// measurement.
+  /// Motion from the previous keyframe's base to this one, tracked by the keyframer; none after a
+  /// gap. It is estimated from the same detections, so use it for gating and linearisation, never
+  /// as a measurement.
   std::optional<geometry::SE2> previous_T_base;
-  /// In order of member and detection, each once. Those of a scan that are not listed made no
+  /// In order of member and detection, each once. Detections that are not listed are in no
   /// landmark; a keyframer of your own may list none.
   std::vector<KeyframeDetection> detections;
 
-  /// Pose of the base. Precondition: there is a member.
+  /// Pose of the base. Precondition: `members` is not empty.
   const geometry::SE2& centre_T_base() const { return members.front().centre_T_vehicle; }
 };
 

@@ -1,4 +1,4 @@
-// The landmarks that the extractor (or the simulator) detects in one sweep.
+// The landmarks detected in one sweep by the extractor or the simulator.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@ using Utime = std::int64_t;
 /// A tree trunk (a circle) or the corner of a house (a vertical edge).
 enum class LandmarkKind : std::uint8_t { kTrunk = 0, kCorner = 1 };
 
-/// One landmark as the vehicle detects it.
+/// One detected landmark.
 struct Detection {
   /// Centre (trunk) or edge (corner), each 1.3 m above the ground, in `vehicle_level` [m].
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
@@ -23,17 +23,17 @@ struct Detection {
   /// Radius of a trunk [m]; 0 where unknown or a corner.
   double radius_m = 0.0;
   LandmarkKind kind = LandmarkKind::kTrunk;
-  /// Of a corner: direction of the bisector, pointing out of the house, frame `vehicle_level`.
+  /// For a corner: direction of the bisector, pointing out of the house, frame `vehicle_level`.
   double bearing_rad = 0.0;
-  double bearing_sigma_rad = 0.0;  ///< Standard deviation of it; 0 = none (a trunk).
+  double bearing_sigma_rad = 0.0;  ///< Its standard deviation; 0 = none (a trunk).
 };
 
-/// Where the sensor can detect landmarks: a sector of a disc around the vehicle.
+/// The area in which the sensor can detect landmarks: a sector of a disc around the vehicle.
 struct FieldOfView {
   double max_range_m = 0.0;  ///< In the plane.
-  /// Middle of the sector [rad], 0 = straight ahead, left positive.
+  /// Direction of the sector's middle [rad], 0 = straight ahead, left positive.
   double bearing_rad = 0.0;
-  /// Whole width of the sector [rad]; 2 pi = all around.
+  /// Full width of the sector [rad]; 2 pi = all around.
   double width_rad = 2.0 * std::numbers::pi;
 
   /// True where a landmark at this position (frame `vehicle_level`) is in the sector.

@@ -14,10 +14,10 @@ constexpr Utime kMaxAge_us = 2'000'000;
 /// Least share of a detection's covariance that remains without the level's part.
 constexpr double kLeastOwnShare = 0.05;
 
-/// How far landmarks are away, about. A level that changes within a revolution displaces those
-/// ahead by another way than those behind, which turns the pose.
+/// Typical distance of landmarks. A level that changes within a revolution displaces landmarks
+/// ahead and behind differently, which rotates the pose.
 constexpr double kLandmarksAway_m = 15.0;
-/// A level that is so many times as uncertain as it has been is another one.
+/// A level with this many times the least variance so far counts as another level.
 constexpr double kWorse = 4.0;
 
 }  // namespace
@@ -44,7 +44,7 @@ LandmarkScan LevelCorrection::levelled(LandmarkScan scan) const {
   for (Detection& detection : scan.detections) {
     if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) continue;
 
-    // The estimated error displaces the detection by its height.
+    // The estimated error displaces the detection in proportion to its height.
     const Eigen::Matrix2d arm = level_arm(detection.position_m.z());
     detection.position_m.head<2>() -= arm * level_->error_rad;
 

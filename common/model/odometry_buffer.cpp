@@ -11,7 +11,7 @@ namespace {
 /// Rounding of stamps between consecutive increments.
 constexpr Utime kGapTolerance_us = 1000;
 
-/// Correlation time of the error of the filter's velocity: it has the power tau * dt when
+/// Correlation time tau of the error of the filter's velocity: its power is tau * dt when
 /// increments are compounded.
 constexpr double kVelocityCorrelation_s = 0.5;
 constexpr std::size_t kMaxIncrements = 20000;
@@ -20,14 +20,14 @@ bool begins_at(const Odometry& increment, Utime utime) {
   return std::abs(increment.from_utime - utime) <= kGapTolerance_us;
 }
 
-/// The increment's samples with the filter's bias of the accelerometer; the gyro's stays.
+/// The increment's samples with the filter's accelerometer bias; the gyro's bias stays.
 Preintegration inertial_of(const Odometry& increment, const VelocityEstimate& start) {
   InertialBias bias = start.bias;
   bias.x() = increment.inertial->bias.x();
   return at_bias(*increment.inertial, bias);
 }
 
-/// The increment's translation, started at the given velocity; the rotation stays.
+/// The increment's translation from the given start velocity; the rotation stays.
 geometry::SE2WithCovariance motion_from(const VelocityEstimate& start, const Odometry& increment,
                                         const Preintegration& inertial) {
   const double dt = inertial.seconds;
@@ -97,7 +97,7 @@ void OdometryBuffer::start_at_velocity(Odometry& increment) {
 void OdometryBuffer::set_filter_velocity(const EkfPose& pose) {
   VelocityEstimate known{pose.utime, pose.velocity_mps, pose.velocity_covariance, pose.bias};
 
-  // The pose may be older than the latest increments: its velocity is carried over them.
+  // The pose may be older than the latest increments: its velocity is propagated over them.
   auto increment = std::find_if(increments_.begin(), increments_.end(), [&](const Odometry& one) {
     return one.utime > known.utime + kGapTolerance_us;
   });
@@ -137,7 +137,7 @@ std::optional<GyroRotation> OdometryBuffer::gyro_rotation(Utime from, Utime to) 
     if (!increment.inertial) return std::nullopt;
     covered += overlap;
 
-    // In proportion to time; at standstill the bias has no effect.
+    // Proportional to time; while stationary the bias has no effect.
     const double part =
         static_cast<double>(overlap) / static_cast<double>(increment.utime - increment.from_utime);
     const double seconds = increment.is_stationary ? 0.0 : 1e-6 * static_cast<double>(overlap);

@@ -9,12 +9,12 @@
 
 namespace understory::model {
 
-/// The vehicle's velocity by a filter that uses landmarks.
+/// The vehicle's velocity from a filter that uses landmarks.
 struct VelocityEstimate {
   Utime utime = 0;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();    ///< [(m/s)^2]
-  InertialBias bias = InertialBias::Zero();  ///< Of it the accelerometer's part is used.
+  InertialBias bias = InertialBias::Zero();  ///< Only the accelerometer's part is used.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -23,10 +23,10 @@ struct VelocityEstimate {
   }
 };
 
-/// The rotation over an interval by the gyro.
+/// The gyro's rotation over an interval.
 struct GyroRotation {
   double rotation_rad = 0.0;
-  double variance = 0.0;  ///< Of the rotation [rad^2]: the gyro's white noise alone.
+  double variance = 0.0;  ///< Variance of the rotation [rad^2] from the gyro's white noise alone.
   double seconds = 0.0;   ///< Time in motion.
   double bias_rad = 0.0;  ///< Rotation that was subtracted as the gyro's bias.
 
@@ -36,7 +36,7 @@ struct GyroRotation {
     a(s.rotation_rad, s.variance, s.seconds, s.bias_rad);
   }
 
-  /// Appends the interval that follows.
+  /// Appends the following interval.
   void operator+=(const GyroRotation& other) {
     rotation_rad += other.rotation_rad;
     variance += other.variance;
@@ -45,10 +45,10 @@ struct GyroRotation {
   }
 };
 
-/// What the IMU alone measured between two stamps.
+/// The motion measured by the IMU alone between two stamps.
 struct InertialMotion {
   Preintegration inertial;
-  bool is_stationary = false;  ///< The vehicle did not move at any time of it.
+  bool is_stationary = false;  ///< The vehicle was stationary during the whole interval.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -57,27 +57,27 @@ struct InertialMotion {
   }
 };
 
-/// Keeps consecutive increments of odometry as they came, at most 20,000; the oldest are dropped.
-/// Those without wheels may start at a filter's velocity.
+/// Stores consecutive increments of odometry, at most 20,000; the oldest are dropped. Increments
+/// without wheels may start at a filter's velocity.
 class OdometryBuffer {
  public:
   /// Adds an increment. One that overlaps the last one or runs backwards is refused (false).
   bool add(const Odometry& increment);
-  /// Without wheels the translation of odometry rests on dead reckoning. Increments that are added
-  /// later and have an IMU but no wheels start at the filter's velocity where that is more certain;
-  /// it counts with kInflation times its variance, since the filter used the same detections as who
-  /// asks. Wheels and rotations are never touched.
+  /// Without wheels, the translation of odometry is from dead reckoning. Later increments with an
+  /// IMU but without wheels start at the filter's velocity where this is more certain; its variance
+  /// is multiplied by kInflation, because the filter used the same detections as the caller. Wheels
+  /// and rotations are never changed.
   void set_filter_velocity(const EkfPose& pose);
-  /// Of the variance of the filter's velocity.
+  /// Factor on the variance of the filter's velocity.
   static constexpr double kInflation = 4.0;
-  /// Motion of the vehicle (from_T_to), or none where a gap or the end of the buffer is in between.
-  /// Inside an increment the twist is constant and the covariance in proportion to time. Cost: the
-  /// increments in between, and a binary search.
+  /// Motion of the vehicle (from_T_to), or none where a gap or the end of the buffer lies between.
+  /// Inside an increment the twist is constant and the covariance proportional to time. Cost: the
+  /// increments between, and a binary search.
   std::optional<geometry::SE2WithCovariance> between(Utime from, Utime to) const;
-  /// The rotation alone by the gyro; none also where there was no IMU.
+  /// The rotation from the gyro alone; none also without an IMU.
   std::optional<GyroRotation> gyro_rotation(Utime from, Utime to) const;
-  /// The motion alone by the IMU. None where a stamp is not the end of an increment, across a gap,
-  /// and where there was no IMU.
+  /// The motion from the IMU alone. None where a stamp is not the end of an increment, across a
+  /// gap, and without an IMU.
   std::optional<InertialMotion> inertial(Utime from, Utime to) const;
   /// Drops the increments that end at `utime` or before.
   void forget_before(Utime utime);
@@ -93,7 +93,7 @@ class OdometryBuffer {
   void start_at_velocity(Odometry& increment);
 
   std::deque<Odometry> increments_;
-  std::optional<VelocityEstimate> velocity_;  ///< At the end of the last increment.
+  std::optional<VelocityEstimate> velocity_;  ///< Velocity at the end of the last increment.
 };
 
 }  // namespace understory::model

@@ -1,4 +1,4 @@
-// The points of one sweep that tell its place.
+// The points of one sweep for place recognition.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 
 namespace understory::model {
 
-/// A point of a PlaceScan: 6 bytes, of which many are kept.
+/// A point of a PlaceScan: 6 bytes, because many are stored.
 struct PlacePoint {
   std::int16_t x_cm = 0;
   std::int16_t y_cm = 0;
@@ -30,16 +30,16 @@ struct PlacePoint {
   }
 };
 
-/// No coordinate of a PlacePoint is farther away [m].
+/// Largest coordinate of a PlacePoint [m].
 inline constexpr float kMostDistantPlacePointM = 327.0F;
-/// The point nearest to `position_m`. Precondition: no coordinate is farther away than
+/// The point nearest to `position_m`. Precondition: no coordinate is beyond
 /// kMostDistantPlacePointM.
 PlacePoint place_point(const Eigen::Vector3f& position_m);
 
-/// Channel PLACE_SCAN: points of a sweep, frame `vehicle_level` at utime, down-sampled. What loop
-/// detectors that compare clouds look at.
+/// Channel PLACE_SCAN: points of a sweep, frame `vehicle_level` at utime, down-sampled. Input of
+/// loop detectors that compare clouds.
 struct PlaceScan {
-  /// So many points are 60 kB.
+  /// This many points have 60 kB.
   static constexpr std::size_t kMostPoints = 9900;
 
   Utime utime = 0;

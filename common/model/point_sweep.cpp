@@ -52,7 +52,7 @@ PointSweep SweepAssembler::Pending::join() && {
 }
 
 std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
-  // Its revolution: one that is pending, or a new one.
+  // Find its revolution: a pending or a new one.
   const auto takes = [&part](const Pending& pending) { return pending.takes(part); };
   auto pending = std::ranges::find_if(pending_, takes);
   if (pending == pending_.end()) {
@@ -63,7 +63,7 @@ std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
     return std::nullopt;
   }
 
-  // Whole?
+  // Is it complete?
   const std::size_t wanted = std::max<std::size_t>(1, part.parts);
   pending->parts.push_back(std::move(part));
   if (pending->parts.size() < wanted) return std::nullopt;

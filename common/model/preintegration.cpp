@@ -25,7 +25,7 @@ Preintegration compound(const Preintegration& first, const Preintegration& secon
   sum.velocity_mps = first.velocity_mps + velocity;
   sum.position_m = first.position_m + next.seconds * first.velocity_mps + position;
 
-  // How errors of each go on, in (yaw, velocity, position).
+  // Propagation of each one's errors, in (yaw, velocity, position).
   Eigen::Matrix<double, 5, 5> of_first = Eigen::Matrix<double, 5, 5>::Identity();
   of_first.block<2, 1>(1, 0) = geometry::perpendicular(velocity);
   of_first.block<2, 1>(3, 0) = geometry::perpendicular(position);
@@ -48,7 +48,7 @@ Eigen::Vector2d added_accelerometer_bias(const Preintegration& inertial) {
   constexpr double kWalk = 1e-3;  // m/s^2/sqrt(s)
   constexpr double kGravity_mps2 = 9.81;
   const Eigen::Vector2d level = inertial.level.added.diagonal();
-  // An error of roll is felt sideways, one of pitch forward.
+  // An error of roll acts sideways, one of pitch forward.
   return Eigen::Vector2d::Constant(kWalk * kWalk * inertial.seconds) +
          kGravity_mps2 * kGravity_mps2 * level.reverse();
 }

@@ -1,11 +1,11 @@
-// Which version of Understory this is.
+// The version of Understory.
 #pragma once
 
 #include <string>
 
 namespace understory::model {
 
-/// As `--version`, HEALTH, CONFIG, map files and results state it, e.g. "0.2.0".
+/// The version in `--version`, HEALTH, CONFIG, map files and results, e.g. "0.2.0".
 std::string program_version();
 
 }  // namespace understory::model

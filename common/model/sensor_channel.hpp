@@ -1,11 +1,11 @@
-// Which channels carry readings of sensors.
+// Channels with readings of sensors.
 #pragma once
 
 #include <string_view>
 
 namespace understory::model {
 
-/// RAW_POSE has the prefix of sensors' channels and is dead reckoning, an output.
+/// RAW_POSE has the prefix of sensors' channels, but is dead reckoning, an output.
 inline bool is_sensor_channel(std::string_view channel) {
   return channel.starts_with("RAW_") && channel != "RAW_POSE";
 }

@@ -14,23 +14,24 @@ namespace understory::model {
 struct SlamPose {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  /// Of the keyframe's update; none = of a scan between keyframes.
+  /// Status of the keyframe's update; none for a scan between keyframes.
   std::optional<MapUpdateStatus> status;
-  bool is_coasting = false;  ///< Between keyframes, by odometry alone: too few landmarks match.
-  std::optional<std::uint64_t> keyframe_sequence;  ///< The keyframe that decided the pose.
+  bool is_coasting = false;  ///< Between keyframes, from odometry alone: too few landmarks match.
+  std::optional<std::uint64_t> keyframe_sequence;  ///< The keyframe that determined the pose.
   std::uint64_t submap_id = 0;                     ///< The active submap.
   geometry::SE2 submap_T_vehicle;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of submap_T_vehicle; m, rad.
-  std::uint64_t correction_version = 0;                  ///< Of the MAP_CORRECTION in force.
-  geometry::SE2 map_T_submap;                            ///< By that correction.
+  /// Covariance of submap_T_vehicle; m, rad.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  std::uint64_t correction_version = 0;  ///< Version of the present MAP_CORRECTION.
+  geometry::SE2 map_T_submap;            ///< From that correction.
   geometry::SE2 map_T_odom;
   std::uint64_t reset_counter = 0;  ///< Counts jumps of the pose.
-  /// Latest jump: old_T_new of the vehicle; identity where it was a change of `map_id`.
+  /// Latest jump: old_T_new of the vehicle; identity at a change of `map_id`.
   geometry::SE2 reset_delta;
-  std::uint32_t map_id = 1;     ///< Of the map that the pose is in; each has its own frame.
-  bool is_provisional = false;  ///< Few keyframes agree with the map yet: it may be dropped.
+  std::uint32_t map_id = 1;     ///< Map of the pose; each map has its own frame.
+  bool is_provisional = false;  ///< Too few keyframes agree with the map so far: it may be dropped.
   bool is_new_map = false;      ///< kFirstMap beside another map.
-  bool is_lost = false;         ///< kNotSure, and odometry does not reach there either.
+  bool is_lost = false;         ///< kNotSure, and odometry has a gap.
 
   /// True where the pose is localised or tracked.
   bool is_localised() const {

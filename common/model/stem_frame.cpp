@@ -5,7 +5,7 @@
 namespace understory::model {
 namespace {
 
-/// Looking straight up or down leaves no heading of x; that of y tells it then.
+/// If x points straight up or down it has no heading; the heading then follows from y.
 double heading_of(const Eigen::Matrix3d& world_R_sensor) {
   const Eigen::Vector2d x = world_R_sensor.col(0).head<2>();
   if (x.norm() > 1e-6) return std::atan2(x.y(), x.x());

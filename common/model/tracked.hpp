@@ -1,4 +1,4 @@
-// Landmarks that are detected scan after scan.
+// Landmarks tracked over scans.
 #pragma once
 
 #include <cstdint>
@@ -8,17 +8,17 @@
 
 namespace understory::model {
 
-/// Id of a track; never used again by another one; 0 = none.
+/// Id of a track; never reused; 0 = none.
 using TrackId = std::uint64_t;
 
 /// A detection with the track of its landmark.
 struct TrackedLandmark {
   TrackId track_id = 0;
   std::uint32_t detection = 0;  ///< Index in the LANDMARKS message of the same utime.
-  Detection observed;           ///< That detection; its covariance as learned (decision 045).
+  Detection observed;           ///< The detection with its learned covariance (decision 045).
 };
 
-/// Channel TRACKED_LANDMARKS: the consistent ones among the detections of one sweep.
+/// Channel TRACKED_LANDMARKS: the consistent detections of one sweep.
 struct TrackedScan {
   Utime utime = 0;
   std::uint64_t sequence = 0;

@@ -7,15 +7,15 @@
 namespace understory::model {
 namespace {
 
-/// Lags that isotonic regression has pooled.
+/// Lags pooled by isotonic regression.
 struct LagPool {
   double value = 0.0;
   double degrees = 0.0;
   std::size_t count = 0;
 };
 
-/// The variogram that does not fall and is nearest to the measured one, weighted by degrees of
-/// freedom (pool adjacent violators).
+/// The non-decreasing variogram nearest to the measured one, weighted by degrees of freedom (pool
+/// adjacent violators).
 std::vector<LagVariance> non_falling(std::span<const LagVariance> lags) {
   std::vector<LagPool> pools;
   for (const LagVariance& one : lags) {
@@ -37,7 +37,7 @@ std::vector<LagVariance> non_falling(std::span<const LagVariance> lags) {
   return result;
 }
 
-/// The autocovariance at a lag of the measured ones; 0 where chance explains it.
+/// The autocovariance at a measured lag; 0 where chance explains it.
 double autocovariance(const LagVariance& at, const LagVariance& sill, double sigmas) {
   const double chance = at.value * std::sqrt(2.0 / at.degrees + 2.0 / sill.degrees);
   return std::max(0.0, sill.value - at.value - sigmas * chance);
@@ -53,7 +53,7 @@ double white_noise_power(std::span<const LagVariance> lags, std::size_t unit_lag
   const auto unit_at = unit - known.begin();
   known = non_falling(known);
 
-  // Trapezia between the lags that were measured; the lag 0 itself is the variance.
+  // Trapezoids between the measured lags; lag 0 itself is the variance.
   const LagVariance& sill = known.back();
   double sum = 0.0;
   for (std::size_t i = 0; i + 1 < known.size(); ++i) {

@@ -8,15 +8,15 @@ namespace understory::model {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-/// What is so little behind the surface may be the landmark itself [m].
+/// A return this close behind the surface may be the landmark itself [m].
 constexpr double kBehind_m = 0.5;
 /// Nearer than this the bins are too coarse [m].
 constexpr double kNear_m = 0.3;
-/// By how much the landmark may stand beside its place [m].
+/// Possible error of the landmark's position [m].
 constexpr double kBeside_m = 0.15;
-/// Of a landmark whose radius is not known [m].
+/// Radius assumed for an unknown radius [m].
 constexpr double kThin_m = 0.05;
-/// So many beams side by side do not all miss a trunk.
+/// A trunk at least this many beams wide stops at least one beam.
 constexpr double kSureBeams = 2.0;
 
 /// Bins from the first one to a bearing, as a fraction.
@@ -26,7 +26,7 @@ double bins_to(const ViewRanges& ranges, double bearing_rad) {
   return turned - all * std::floor(turned / all);
 }
 
-/// Of a bin before 0 or beyond the turn: the one that it is; none in a gap.
+/// The index of a bin wrapped into the turn; none in a gap.
 std::ptrdiff_t bin_of(const ViewRanges& ranges, std::ptrdiff_t index) {
   const auto all = static_cast<std::ptrdiff_t>(std::lround(kTurn / std::abs(ranges.step_rad)));
   const std::ptrdiff_t bin = ((index % all) + all) % all;
@@ -37,7 +37,7 @@ double bearing_of(const Eigen::Vector2d& offset_m) {
   return std::atan2(offset_m.y(), offset_m.x());
 }
 
-/// From where the sensor was when it looked there.
+/// Offset from the sensor's position when it measured that direction.
 Eigen::Vector2d offset_of(const ViewRanges& ranges, const Eigen::Vector2d& place_m) {
   Eigen::Vector2d offset_m = place_m - ranges.sensor_m;
   for (int round = 0; round < 2; ++round) {
@@ -59,7 +59,7 @@ LineOfSight line_of_sight(const ViewRanges& ranges, const Eigen::Vector2d& place
   if (distance_m - radius_m <= kNear_m) return LineOfSight::kUnknown;
   const double beyond_m = distance_m + radius_m + kBehind_m;
 
-  // From side to side.
+  // Bins over the landmark's width.
   const double half =
       std::asin(std::min(1.0, (radius_m + kBeside_m) / distance_m)) / std::abs(ranges.step_rad);
   const double middle = bins_to(ranges, bearing_of(offset_m));

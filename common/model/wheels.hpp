@@ -1,4 +1,4 @@
-// One sample of the wheels of a car.
+// One sample of a car's wheels.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace understory::model {
 struct WheelSample {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  double speed_mps = 0.0;     ///< Of the wheel that carries the encoder; backwards negative.
+  double speed_mps = 0.0;     ///< Speed of the wheel with the encoder; backwards negative.
   double steering_rad = 0.0;  ///< Left positive.
 };
 
