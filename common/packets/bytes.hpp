@@ -1,4 +1,4 @@
-// Numbers inside of packets: all makers send them with the least byte first.
+// Numbers inside of packets: all makers use little-endian order.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@ requires std::is_arithmetic_v<Number> Number number_at(std::span<const std::uint
   return number;
 }
 
-/// x, y, z, one behind the other.
+/// x, y, z in sequence.
 template <class Number>
 Eigen::Vector3d vector_at(std::span<const std::uint8_t> bytes, std::size_t at) {
   const auto component = [&](std::size_t axis) {

@@ -1,4 +1,5 @@
-// One interface for the lasers of all makers: packets in, sweeps, IMU samples and fixes out.
+// One interface for the lasers of all makers: input: packets; output: sweeps, IMU samples and
+// fixes.
 //
 // A family is a class with `Readings add(const Packet&)`, `std::optional<model::PointSweep>
 // finish()` and `const StreamCounts& counts() const`; another family is another alternative here.
@@ -17,7 +18,7 @@
 
 namespace understory::packets {
 
-/// What a family's class can do.
+/// Requirements on a family's class.
 template <class Family>
 concept PacketStream = requires(Family& stream, const Family& seen, const Packet& packet) {
   { stream.add(packet) } -> std::same_as<Readings>;
@@ -31,32 +32,33 @@ static_assert(PacketStream<VelodyneStream> && PacketStream<OusterStream> &&
 /// A laser of any of the families.
 using Decoder = std::variant<VelodyneStream, OusterStream, LivoxStream, HesaiStream>;
 
-/// What this packet brought.
+/// Adds a packet; returns its readings.
 Readings add(Decoder& decoder, const Packet& packet);
-/// The sweep under way, where it is almost whole.
+/// The present sweep, if it is almost complete.
 std::optional<model::PointSweep> finish(Decoder& decoder);
-/// Since the start.
+/// Counts since the start.
 const StreamCounts& counts(const Decoder& decoder);
-/// How the sensor's clock was laid onto the computer's; null for Velodyne, which gives the hour's
-/// microseconds only.
+/// Relation of the sensor's clock to the computer's; null for Velodyne, which sends only
+/// microseconds of the hour.
 const SensorClock* clock(const Decoder& decoder);
 
-/// Where the IMU inside of the laser sits, in frame `sensor` [m]; none where it has none or the
-/// maker does not tell.
+/// Position of the laser's IMU in frame `sensor` [m]; none without an IMU or where it is not
+/// published.
 std::optional<Eigen::Vector3d> imu_position_m(const Decoder& decoder);
 
-/// What is known of a sensor beside its packets.
+/// Description of a sensor beside its packets.
 struct SensorDescription {
-  std::string model;            ///< A name that the families' *_model() take; "ouster".
-  std::string description;      ///< Text of the file that the model needs or may have: Ouster's
-                                ///< metadata, the HDL-64E's calibration, Hesai's angle correction.
-  std::string source;           ///< That file's name, for messages.
-  double max_range_m = 0.0;     ///< 0 = the model's.
-  double livox_period_s = 0.1;  ///< Duration of a sweep where the pattern does not repeat.
+  std::string model;         ///< A name for the families' *_model(), or "ouster".
+  std::string description;   ///< Text of the model's required or optional file: Ouster's metadata,
+                             ///< the HDL-64E's calibration, Hesai's angle correction.
+  std::string source;        ///< That file's name, for messages.
+  double max_range_m = 0.0;  ///< Range; 0 = the model's.
+  double livox_period_s = 0.1;  ///< Duration of a sweep of a non-repeating pattern.
 };
-/// All names that SensorDescription::model may have, comma separated.
+/// All possible values of SensorDescription::model, comma separated.
 std::string known_models();
-/// Throws DataError where the model is not known, needs a file and has none, or cannot have one.
+/// Throws DataError where the model is unknown, a required file is missing, or a file is not
+/// allowed.
 Decoder make_decoder(const SensorDescription& sensor);
 
 }  // namespace understory::packets

@@ -23,7 +23,8 @@ constexpr std::array<std::pair<std::string_view, HesaiModel>, 6> kHesaiModels{
      {"xt32", HesaiModel::kPandarXt32},
      {"xt32m2x", HesaiModel::kXt32m2x}}};
 
-/// Of beams that fire one after the other, every `step_us`; after `beams` of them again from 0.
+/// Firing times of beams that fire in sequence, every `step_us`; restarts at 0 after `beams` of
+/// them.
 std::vector<double> even_firing_us(std::size_t count, double first_us, double step_us,
                                    std::size_t beams) {
   std::vector<double> result;
@@ -32,7 +33,7 @@ std::vector<double> even_firing_us(std::size_t count, double first_us, double st
   return result;
 }
 
-/// Pandar40P and Pandar64 manuals, "Absolute Time of Point Cloud Data": shots lie before the
+/// Pandar40P and Pandar64 manuals, "Absolute Time of Point Cloud Data": shots are before the
 /// block's time (`laser40Offset_` and `laser64Offset_` of HesaiLidar_General_SDK).
 template <std::size_t kSize>
 std::vector<double> before_block(const std::array<double, kSize>& offsets_us) {

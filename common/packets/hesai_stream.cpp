@@ -16,9 +16,9 @@ namespace {
 using HesaiBytes = std::span<const std::uint8_t>;
 
 constexpr int kTurn = 36000;  // hundredths of a degree
-/// Of the azimuth from firing to firing; more is a gap. XT32 at 20 Hz, dual: 36 in 50 us.
+/// Largest step of the azimuth between firings; more is a gap. XT32 at 20 Hz, dual: 36 in 50 us.
 constexpr int kLargestStep = 600;
-/// A turn with a longer pause in it is of two.
+/// A longer pause separates two turns.
 constexpr std::int64_t kLongestPause_ns = 50'000'000;
 constexpr double kRadPerHundredth = 2.0 * std::numbers::pi / kTurn;
 constexpr std::size_t kMostBlocks = 10;
@@ -43,19 +43,19 @@ std::optional<std::int64_t> seconds_of(HesaiBytes date) {
 
 }  // namespace
 
-/// What a packet says beside its points.
+/// Values of a packet beside its points.
 struct HesaiStream::Head {
-  std::array<int, kMostBlocks> azimuth{};  ///< Of each block.
+  std::array<int, kMostBlocks> azimuth{};  ///< Azimuth of each block.
   std::size_t returns = 1;                 ///< Blocks of each firing.
-  double unit_m = 0.004;                   ///< Of distances.
+  double unit_m = 0.004;                   ///< Unit of distances.
   std::int64_t time_ns = 0;                ///< Sensor's clock.
 };
 
-/// All beams once.
+/// One firing of all beams.
 struct HesaiStream::Firing {
-  std::size_t block = 0;  ///< Its first.
+  std::size_t block = 0;  ///< Its first block.
   int azimuth = 0;
-  std::int64_t time_ns = 0;  ///< Placed.
+  std::int64_t time_ns = 0;  ///< Time on the computer's clock.
 };
 
 HesaiStream::HesaiStream(HesaiModel model, std::vector<HesaiBeam> beams, double max_range_m)
@@ -102,12 +102,12 @@ std::optional<Fault> HesaiStream::read_head(HesaiBytes bytes, Head& head) const 
 
 void HesaiStream::end_turn(std::vector<model::PointSweep>& sweeps) {
   auto sweep = builder_.take();
-  // What came before the first passage of azimuth zero is part of a revolution.
+  // Points before the first passage of azimuth zero are an incomplete revolution.
   const bool is_whole = std::exchange(has_begin_, true);
   if (sweep && is_whole) sweeps.push_back(*std::move(sweep));
 }
 
-/// What was gathered is no part of the turn that comes.
+/// Drops collected points that are not part of the next turn.
 void HesaiStream::start_over() {
   builder_.clear();
   has_begin_ = false;

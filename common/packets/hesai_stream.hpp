@@ -18,21 +18,22 @@ namespace understory::packets {
 
 constexpr std::uint16_t kHesaiPort = 2368;
 
-/// Point packets in, whole revolutions out, in frame `sensor` (x forward = azimuth 0, y left, z up;
-/// Hesai's own axes have y at azimuth 0). Two or three returns give all points that differ.
+/// Input: point packets; output: complete revolutions in frame `sensor` (x forward = azimuth 0, y
+/// left, z up; Hesai's own axes have y at azimuth 0). Two or three returns give all different
+/// points.
 class HesaiStream {
  public:
-  /// `beams`: of the model, or from the sensor's angle correction file. Points at `max_range_m` and
-  /// beyond are left out; 0 = the model's range.
+  /// `beams`: those of the model, or from the sensor's angle correction file. Points at
+  /// `max_range_m` and beyond are left out; 0 = the model's range.
   HesaiStream(HesaiModel model, std::vector<HesaiBeam> beams, double max_range_m = 0.0);
 
-  /// What this packet brought: the revolution that ends in it.
+  /// Adds a packet; returns the revolution that ends in it, if any.
   Readings add(const Packet& packet);
-  /// The revolution under way, where it lacks no more than the last packets.
+  /// The present revolution, if at most its last packets are missing.
   std::optional<model::PointSweep> finish();
 
-  const StreamCounts& counts() const { return counts_; }  ///< Since the start.
-  const SensorClock& clock() const { return clock_; }     ///< The sensor's.
+  const StreamCounts& counts() const { return counts_; }  ///< Counts since the start.
+  const SensorClock& clock() const { return clock_; }     ///< The sensor's clock.
 
  private:
   struct Head;
@@ -49,12 +50,12 @@ class HesaiStream {
   SensorClock clock_;
   SweepBuilder builder_;
   StreamCounts counts_;
-  std::vector<std::uint16_t> rings_;  ///< Of each beam.
+  std::vector<std::uint16_t> rings_;  ///< Ring of each beam.
   std::vector<std::size_t> order_;    ///< Beams in order of their rings.
-  std::int64_t last_ns_ = 0;          ///< Of the last packet, sensor's clock.
-  int last_azimuth_ = -1;             ///< Of the last firing [0.01 degrees].
+  std::int64_t last_ns_ = 0;          ///< Time of the last packet, sensor's clock.
+  int last_azimuth_ = -1;             ///< Azimuth of the last firing [0.01 degrees].
   double azimuth_rate_ = 0.36;        ///< [0.01 degrees per us].
-  bool has_begin_ = false;            ///< The turn under way began at azimuth 0.
+  bool has_begin_ = false;            ///< The present turn began at azimuth 0.
 };
 
 }  // namespace understory::packets

@@ -1,12 +1,12 @@
-// Angles and firing times of Hesai's models: nominal, of the makers' documents. Each sensor has a
-// correction file of its own (hesai_model.hpp, parse_hesai_angles).
+// Angles and firing times of Hesai's models: nominal values from the maker's documents. Each sensor
+// has its own correction file (hesai_model.hpp, parse_hesai_angles).
 #pragma once
 
 #include <array>
 
 namespace understory::packets {
 
-/// Elevation, and azimuth from the block's, clockwise [degrees].
+/// Elevation, and azimuth relative to the block's, clockwise [degrees].
 struct HesaiAngles {
   double elevation_deg;
   double azimuth_deg;
@@ -71,8 +71,7 @@ constexpr std::array<double, 64> kPandar64Firing_us = {
     4.924,  21.876, 14.052, 17.964, 8.836,  19.268, 3.62,   20.572, 12.748, 16.66,  7.532,
     11.444, 6.228,  15.356, 10.14,  4.924,  3.62,   14.052, 8.836,  12.748};
 
-/// HesaiLidar_General_SDK, `laserQTOffset_`: after the block's time, of which 10 us are taken out
-/// [us].
+/// HesaiLidar_General_SDK, `laserQTOffset_`: after the block's time, minus 10 us [us].
 constexpr std::array<double, 64> kPandarQtFiring_us = {
     2.31,  4.37,   6.43,   8.49,   10.54,  12.6,   14.66,  16.71,  19.16,  21.22,  23.28,
     25.34, 27.39,  29.45,  31.5,   33.56,  36.61,  38.67,  40.73,  42.78,  44.84,  46.9,

@@ -94,7 +94,7 @@ std::optional<std::int64_t> utc_ns(LivoxBytes bytes) {
   return ((days * 24 + hour) * 3600) * kSecond_ns + std::int64_t{micros} * 1000;
 }
 
-/// The time within the second, in the second that is nearest to the reception.
+/// The time within the second, in the second nearest to the reception.
 std::int64_t near_reception_ns(std::int64_t within_ns, model::Utime received) {
   const std::int64_t late_ns = received * 1000 - within_ns;
   const std::int64_t seconds = (late_ns + kSecond_ns / 2) / kSecond_ns;

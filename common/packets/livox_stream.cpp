@@ -9,7 +9,7 @@
 namespace understory::packets {
 namespace {
 
-/// A packet's first point may lie so much before the last one of the packet before it.
+/// Largest overlap of a packet's first point with the end of the previous packet.
 constexpr std::int64_t kLargestOverlap_ns = 2'000'000;
 
 constexpr double kGravity_mps2 = 9.80665;  // IMU packets: rad/s and g
@@ -48,7 +48,7 @@ Readings LivoxStream::add(const Packet& packet) {
   return readings;
 }
 
-/// What was gathered before the clock was set is no part of the sweep.
+/// Points collected before the clock was set are not part of the sweep.
 void LivoxStream::take_time(std::int64_t time_ns, model::Utime received) {
   if (clock_.take(time_ns, received) == SensorClock::Step::kNext) return;
   ++counts_.jumps;
@@ -92,7 +92,7 @@ void LivoxStream::add_points(const Packet& packet, const LivoxHeader& header, Re
     const std::int64_t period = time_ns / period_ns_;
     if (!period_ || period > *period_) {
       end_sweep(readings.sweeps);
-      // Of the first one the begin may be missing.
+      // The begin of the first sweep may be missing.
       has_begin_ = period_.has_value();
       period_ = period;
     }

@@ -1,5 +1,5 @@
 // Packets of Livox lasers (`livox_packet.hpp`). The pattern never repeats, so there are no
-// revolutions: a sweep is what was measured within a period.
+// revolutions: a sweep contains the points of one period.
 #pragma once
 
 #include <cstdint>
@@ -12,31 +12,31 @@
 
 namespace understory::packets {
 
-/// Where packets are sent to, UDP (Livox-SDK2, `define.h`).
+/// UDP destination ports of packets (Livox-SDK2, `define.h`).
 struct LivoxPorts {
   std::uint16_t points = 56301;
   std::uint16_t imu = 56401;
 };
-/// Of an SDK2 model as it comes; those of SDK1 are agreed on by laser and host: 0.
+/// Default ports of an SDK2 model; 0 for SDK1, where laser and host negotiate them.
 LivoxPorts livox_ports(LivoxModel model);
 
-/// Point and IMU packets in, sweeps of a fixed duration and IMU samples out, in frame `sensor` as
-/// the laser has it (x forward, z up). Rings are the lines of the laser's emitters, as Livox's own
-/// driver numbers them: point i of a packet is of line i modulo the number of lines.
+/// Input: point and IMU packets; output: sweeps of fixed duration and IMU samples in the laser's
+/// own frame `sensor` (x forward, z up). Rings are the lines of the laser's emitters, numbered as
+/// in Livox's driver: point i of a packet belongs to line i modulo the number of lines.
 class LivoxStream {
  public:
   /// `period_s`: duration of a sweep. Points at `max_range_m` and beyond are left out; 0 = the
   /// model's range.
   explicit LivoxStream(LivoxModel model, double period_s = 0.1, double max_range_m = 0.0);
 
-  /// What this packet brought: an IMU sample, or the sweep that ends before it.
+  /// Adds a packet; returns an IMU sample, or the sweep that ends before it.
   Readings add(const Packet& packet);
-  /// The sweep under way, where at least half of its period has passed.
+  /// The present sweep, if at least half of its period has passed.
   std::optional<model::PointSweep> finish();
 
-  const StreamCounts& counts() const { return counts_; }  ///< Since the start.
-  const SensorClock& clock() const { return clock_; }     ///< The sensor's.
-  /// Of the IMU in the laser's frame; the HAP's is not published.
+  const StreamCounts& counts() const { return counts_; }  ///< Counts since the start.
+  const SensorClock& clock() const { return clock_; }     ///< The sensor's clock.
+  /// Position of the IMU in the laser's frame; the HAP's is not published.
   std::optional<Eigen::Vector3d> imu_position_m() const;
 
  private:
@@ -54,11 +54,11 @@ class LivoxStream {
   SweepBuilder builder_;
   StreamCounts counts_;
   std::optional<std::int64_t> period_;  ///< Number of the sweep's period since the clock's zero.
-  bool has_begin_ = false;              ///< The sweep under way began with its period.
-  std::int64_t latest_ns_ = 0;          ///< Of the last point, sensor's clock.
+  bool has_begin_ = false;              ///< The present sweep began with its period.
+  std::int64_t latest_ns_ = 0;          ///< Time of the last point, sensor's clock.
   std::optional<std::uint16_t> packet_number_;
   std::optional<std::int64_t>
-      next_ns_;  ///< When the next packet of points begins, if none is lost.
+      next_ns_;  ///< Start time of the next packet of points, if none is lost.
   std::uint64_t imu_samples_ = 0;
 };
 

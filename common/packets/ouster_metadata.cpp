@@ -44,7 +44,7 @@ class Fields {
   }
 
   const Json* find(const char* section, const char* name) const {
-    // The flat layout has one section, of another name.
+    // The flat layout has one section, with another name.
     const bool is_format = section == std::string_view("lidar_data_format");
     for (const char* in : {section, is_format ? "data_format" : section}) {
       const auto found = root_.find(in);
@@ -82,7 +82,7 @@ class Fields {
     return values;
   }
 
-  /// A whole number within [least, most].
+  /// An integer within [least, most].
   std::size_t whole(const char* name, double value, std::size_t least, std::size_t most) const {
     if (value != std::floor(value) || value < static_cast<double>(least) ||
         value > static_cast<double>(most))
@@ -151,7 +151,7 @@ std::vector<double> beam_angles(const Fields& fields, const char* name) {
   return *std::move(angles);
 }
 
-/// From "1024x10".
+/// Columns from "1024x10".
 std::optional<double> columns_of_mode(const std::string& mode) {
   std::size_t columns = 0;
   const auto result = std::from_chars(mode.data(), mode.data() + mode.size(), columns);
@@ -167,7 +167,7 @@ void read_format(const Fields& fields, OusterMetadata& metadata) {
   const auto known = ouster_profile(profile);
   if (!known) fields.fail("udp_profile_lidar", "\"" + profile + "\" is not known");
   metadata.profile = *known;
-  // Since firmware 3.2 the header is chosen apart from the pixels.
+  // Since firmware 3.2 the header is chosen separately from the pixels.
   if (fields.text("lidar_data_format", "header_type") == "FUSA" &&
       known->pixel != OusterPixel::kLegacy)
     metadata.profile.has_safety_header = true;

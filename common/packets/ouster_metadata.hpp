@@ -1,4 +1,4 @@
-// The metadata of an Ouster laser: what its packets do not say about themselves.
+// The metadata of an Ouster laser, needed to decode its packets.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -11,7 +11,7 @@
 
 namespace understory::packets {
 
-/// Where range and reflectivity of a pixel lie (Ouster firmware manual, "Lidar Data Packet
+/// Layout of range and reflectivity in a pixel (Ouster firmware manual, "Lidar Data Packet
 /// Format").
 enum class OusterPixel : std::uint8_t {
   kLegacy,
@@ -26,12 +26,14 @@ struct OusterProfile {
   std::string_view name;
   OusterPixel pixel = OusterPixel::kLegacy;
   std::size_t pixel_bytes = 12;
-  bool has_safety_header = false;  ///< The frame's number has 32 bits, elsewhere in the header.
+  /// The frame's number has 32 bits, at another place in the header.
+  bool has_safety_header = false;
 };
-/// All that are read: LEGACY, RNG19_RFL8_SIG16_NIR16, RNG19_RFL8_SIG16_NIR16_DUAL, RNG15_RFL8_NIR8,
-/// RNG15_RFL8_NIR8_DUAL, FUSA_RNG15_RFL8_NIR8_DUAL, and those with zones, windows and five words.
+/// All supported ones: LEGACY, RNG19_RFL8_SIG16_NIR16, RNG19_RFL8_SIG16_NIR16_DUAL,
+/// RNG15_RFL8_NIR8, RNG15_RFL8_NIR8_DUAL, FUSA_RNG15_RFL8_NIR8_DUAL, and those with zones, windows
+/// and five words.
 std::span<const OusterProfile> ouster_profiles();
-/// By its name; none for another.
+/// Profile by its name; none for any other.
 std::optional<OusterProfile> ouster_profile(std::string_view name);
 
 /// What the decoder needs of the metadata. Translations are in metres (the file has millimetres).
@@ -40,11 +42,13 @@ struct OusterMetadata {
   OusterProfile profile = {"LEGACY"};
   std::size_t columns_per_frame = 1024;
   std::size_t columns_per_packet = 16;
-  std::size_t first_column = 0;  ///< The azimuth window; it may go through column 0.
+  std::size_t first_column = 0;  ///< The azimuth window; it may include column 0.
   std::size_t last_column = 1023;
-  std::vector<double> altitude_rad;  ///< Of each beam, upwards.
-  std::vector<double> azimuth_rad;   ///< Of each beam, from the encoder's angle, clockwise.
-  Eigen::Isometry3d lidar_T_beam = Eigen::Isometry3d::Identity();  ///< At encoder angle 0.
+  std::vector<double> altitude_rad;  ///< Elevation of each beam, upwards.
+  std::vector<double>
+      azimuth_rad;  ///< Azimuth of each beam relative to the encoder's angle, clockwise.
+  /// Transform at encoder angle 0.
+  Eigen::Isometry3d lidar_T_beam = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d sensor_T_lidar = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d sensor_T_imu = Eigen::Isometry3d::Identity();
 
@@ -53,9 +57,9 @@ struct OusterMetadata {
 
 /// Reads both layouts: the flat one of firmware before 2.4 and of older clients, and the nested one
 /// (`sensor_info`, `config_params`, `lidar_data_format`, `beam_intrinsics`, `lidar_intrinsics`,
-/// `imu_intrinsics`). What is missing has the makers' default (ouster-sdk, `metadata.cpp` and
-/// `types.cpp`), save for beam angles and the number of columns. Throws DataError, which names
-/// `source` and the field.
+/// `imu_intrinsics`). Missing values have the maker's default (ouster-sdk, `metadata.cpp` and
+/// `types.cpp`), except beam angles and the number of columns. Throws DataError with `source` and
+/// the field.
 OusterMetadata parse_ouster_metadata(std::string_view text, const std::string& source);
 
 }  // namespace understory::packets

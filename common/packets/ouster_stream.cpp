@@ -21,7 +21,7 @@ constexpr std::size_t kImuSample = 36;
 constexpr std::size_t kImuFooter = 32;
 constexpr std::int64_t kLongestPacket_ns = 1'000'000'000;
 
-/// Ranges by the data sheets (OS0, OS1, OS2, OSDome; Rev7, 80 % reflectivity and more).
+/// Ranges from the data sheets (OS0, OS1, OS2, OSDome; Rev7, 80 % reflectivity and more).
 double usual_range_m(std::string_view product_line) {
   if (product_line.starts_with("OS-0")) return 100.0;
   if (product_line.starts_with("OS-2")) return 500.0;
@@ -35,7 +35,7 @@ struct Return {
   std::uint8_t reflectivity = 0;
 };
 
-/// `parsing.cpp`, *_field_info: where range and reflectivity lie, masks and units.
+/// `parsing.cpp`, *_field_info: places of range and reflectivity, masks and units.
 Return first_return(Bytes pixel, OusterPixel pixel_kind) {
   constexpr std::uint32_t kLegacyRange = 0xFFFFF;
   constexpr std::uint32_t kRange = 0x7FFFF;
@@ -178,7 +178,7 @@ std::size_t OusterStream::from_window(std::size_t column) const {
          metadata_.columns_per_frame;
 }
 
-/// Modes have 512, 1024 or 2048 columns. With the wrong one the cloud would be bent.
+/// Modes have 512, 1024 or 2048 columns. The wrong mode would deform the cloud.
 bool OusterStream::is_of_fewer_columns() const {
   const std::size_t columns = metadata_.columns_per_frame;
   const bool is_whole_turn = from_window(metadata_.last_column) + 1 == columns;
@@ -202,7 +202,7 @@ void OusterStream::end_frame(std::vector<model::PointSweep>& sweeps) {
 
 void OusterStream::add_lidar(const Packet& packet, Readings& readings) {
   const std::uint32_t frame = frame_id(packet.bytes);
-  // Numbers wrap: what lies behind is nearer backwards than forwards.
+  // Numbers wrap: an earlier number is nearer backwards than forwards.
   const auto ahead = static_cast<std::int16_t>(frame - frame_id_.value_or(frame));
   constexpr int kLatestFrames = 3;
   if (ahead < 0 && ahead >= -kLatestFrames) {
@@ -211,7 +211,7 @@ void OusterStream::add_lidar(const Packet& packet, Readings& readings) {
   }
 
   if (ahead != 0) end_frame(readings.sweeps);
-  // Of the first frame the begin may be missing: the sensor had sent it before.
+  // The begin of the first frame may be missing, because it was sent before.
   if (ahead != 0) has_begin_ = true;
   const bool is_first = !frame_id_;
   frame_id_ = frame;
@@ -237,7 +237,7 @@ void OusterStream::add_lidar(const Packet& packet, Readings& readings) {
   }
 }
 
-/// What was gathered before the clock was set is no part of the frame.
+/// Points collected before the clock was set are not part of the frame.
 void OusterStream::take_time(std::int64_t time_ns, model::Utime received) {
   if (clock_.take(time_ns, received) == SensorClock::Step::kNext) return;
   ++counts_.jumps;

@@ -18,7 +18,7 @@ void SensorClock::place(std::int64_t sensor_ns, std::int64_t received_ns) {
 
 SensorClock::Step SensorClock::take(std::int64_t sensor_ns, model::Utime received) {
   const std::int64_t received_ns = std::clamp(received, -kLatest_us, kLatest_us) * 1000;
-  // In doubles: of damaged packets the differences are large.
+  // In doubles, because differences of damaged packets may be large.
   const double mismatch_ns =
       (static_cast<double>(received_ns) - static_cast<double>(received_ns_)) -
       (static_cast<double>(sensor_ns) - static_cast<double>(sensor_ns_));

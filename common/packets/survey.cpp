@@ -37,7 +37,7 @@ std::optional<Recognised> recognise_velodyne(Payload bytes) {
       fmt::format("Velodyne data packet of another model (product {:#04x})", bytes[kProductAt])};
 }
 
-/// Sizes of several profiles are the same; the metadata say which it is.
+/// Several profiles have equal sizes; the metadata determine the profile.
 std::optional<Recognised> recognise_ouster(Payload bytes, std::uint16_t port) {
   constexpr std::uint8_t kLidar = 1;
   if (bytes.size() == kOusterImuBytes && port == kOusterImuPort)
@@ -59,7 +59,7 @@ std::optional<Recognised> recognise_ouster(Payload bytes, std::uint16_t port) {
   return std::nullopt;
 }
 
-/// Six lines and one look alike in the types that both have.
+/// Models with six lines and with one are indistinguishable in common packet types.
 Recognised recognised_sdk1(Payload bytes) {
   constexpr std::size_t kTypeAt = 9;
   constexpr std::uint8_t kSpherical = 1;

@@ -1,4 +1,4 @@
-// What a capture holds: which senders, ports and makers.
+// Contents of a capture: senders, ports and makers.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace understory::packets {
 
-/// What the packets of a flow look like.
+/// Apparent kind of a flow's packets.
 enum class Kind : std::uint8_t {
   kUnknown,
   kPoints,
@@ -22,7 +22,7 @@ enum class Kind : std::uint8_t {
 /// A guess from the bytes and the port of one packet.
 struct Recognised {
   Kind kind = Kind::kUnknown;
-  std::string model;  ///< A name that make_decoder() takes; empty = not known.
+  std::string model;  ///< A name for make_decoder(); empty = unknown.
   std::string text;   ///< For people: "Ouster lidar packet, 128 beams, legacy".
 };
 /// Never throws; cost O(1) in the number of points.
@@ -34,21 +34,21 @@ struct Flow {
   std::uint16_t port = 0;    ///< UDP, destination.
   std::uint64_t packets = 0;
   std::map<std::size_t, std::uint64_t> sizes;  ///< [bytes] and how many; at most 20 sizes.
-  Recognised recognised;                       ///< Of the first packet that is known.
+  Recognised recognised;                       ///< Guess from the first recognised packet.
 };
 
 /// The flows of a capture, those with the most packets first.
 struct Survey {
   std::vector<Flow> flows;
-  double duration_s = 0.0;    ///< From the first packet to the last.
-  bool is_whole_file = true;  ///< Not just its first packets.
+  double duration_s = 0.0;    ///< Time from the first packet to the last.
+  bool is_whole_file = true;  ///< True: the whole file was read.
 };
 /// Reads at most `most_packets` (0 = all). Throws DataError.
 Survey survey_capture(const std::filesystem::path& path, std::uint64_t most_packets = 0);
 
 /// "192.168.1.201".
 std::string address_text(std::uint32_t address);
-/// A line for each flow: sender, port, packets, sizes, what it looks like.
+/// A line for each flow: sender, port, packets, sizes, apparent kind.
 std::string survey_text(const Survey& survey);
 
 }  // namespace understory::packets

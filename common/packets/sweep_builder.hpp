@@ -10,24 +10,23 @@
 
 namespace understory::packets {
 
-/// Gathers points with absolute times and gives them as a sweep whose utime is that of the
-/// earliest.
+/// Collects points with absolute times and returns them as a sweep with the utime of the earliest.
 class SweepBuilder {
  public:
-  /// `rings`, `max_range_m`: of the sensor.
+  /// `rings`, `max_range_m`: those of the sensor.
   SweepBuilder(std::uint16_t rings, double max_range_m)
       : rings_(rings), max_range_m_(max_range_m) {}
 
-  /// Adds a point in frame `sensor`, measured at `time_ns` [ns since 1970]. Leaves it out where the
-  /// sweep has kMostPoints: of a sensor that never ends its sweeps.
+  /// Adds a point in frame `sensor`, measured at `time_ns` [ns since 1970]. Skips it if the sweep
+  /// has kMostPoints, for a sensor that never ends its sweeps.
   void add(const Eigen::Vector3f& position_m, std::int64_t time_ns, std::uint16_t ring,
            std::uint8_t intensity);
-  /// The sweep, in order of time and of ring; none where it has no points. The next one begins.
+  /// The sweep, in order of time and of ring; none without points. Then the next sweep begins.
   std::optional<model::PointSweep> take();
-  /// Forgets the points.
+  /// Drops the points.
   void clear();
 
-  static constexpr std::size_t kMostPoints = 2'000'000;  ///< Of a sweep.
+  static constexpr std::size_t kMostPoints = 2'000'000;  ///< Largest number of points of a sweep.
   std::size_t size() const { return points_.size(); }    ///< Points so far.
 
  private:

@@ -1,4 +1,4 @@
-// Packets of Velodyne lasers (common/io/velodyne.hpp) as every other family's.
+// Packets of Velodyne lasers (common/io/velodyne.hpp) with the interface of all families.
 #pragma once
 
 #include <optional>
@@ -9,20 +9,20 @@
 
 namespace understory::packets {
 
-/// Data and position packets in, revolutions and fixes out. Stamps: the sensor's clock
+/// Input: data and position packets; output: revolutions and fixes. Stamps: the sensor's clock
 /// (microseconds past the hour) in the hour nearest to the reception.
 class VelodyneStream {
  public:
-  /// As VelodyneDecoder.
+  /// Parameters as for VelodyneDecoder.
   explicit VelodyneStream(io::VelodyneCalibration calibration, double max_range_m = 0.0)
       : model_(calibration.model), decoder_(std::move(calibration), max_range_m) {}
 
-  /// What this packet brought: a fix, or the revolution that it ends.
+  /// Adds a packet; returns a fix, or the revolution that it ends.
   Readings add(const Packet& packet);
-  /// The revolution under way, where it lacks no more than the last packet.
+  /// The present revolution, if at most its last packet is missing.
   std::optional<model::PointSweep> finish();
 
-  const StreamCounts& counts() const { return counts_; }  ///< Since the start.
+  const StreamCounts& counts() const { return counts_; }  ///< Counts since the start.
 
  private:
   io::VelodyneModel model_;
