@@ -1,4 +1,4 @@
-// What the loop detectors can be told; one struct each.
+// Parameters of the loop detectors; one struct each.
 #pragma once
 
 #include <cstddef>
@@ -39,29 +39,28 @@ struct ScanContextParameters {
   double max_range_m = 40.0;         ///< Points farther away are left out.
   double lift_m = 2.0;               ///< Added to heights, so that the ground is above zero.
   double root_shift_m = 2.0;         ///< Copies of the query are shifted sideways by this.
-  std::size_t root_shifts = 1;       ///< So many to each side; 0 = the query alone.
-  std::size_t ring_candidates = 50;  ///< Nearest ring keys that are compared in full.
+  std::size_t root_shifts = 1;       ///< Number of copies to each side; 0 = the query alone.
+  std::size_t ring_candidates = 50;  ///< Nearest ring keys whose frames are compared in full.
 };
 
-/// Geometric hierarchy (thesis 000 §3.2): polygons alike vote for frames.
+/// Geometric hierarchy (thesis 000 §3.2): similar polygons vote for frames.
 struct HierarchyDetectorParameters {
   double max_descriptor_distance = 2.0;  ///< [tau]
-  std::size_t most_frames = 30;          ///< With most votes, whose landmarks are matched.
-  double gate_m = 0.5;                   ///< Pairs of landmarks that agree on a motion are nearer.
-  double max_distance_m = 12.0;          ///< Frames taken farther away are not looked for.
+  std::size_t most_frames = 30;  ///< Frames with the most votes, whose landmarks are matched.
+  double gate_m = 0.5;           ///< Largest distance of pairs that agree on a motion.
+  double max_distance_m = 12.0;  ///< Frames taken farther away are not searched.
 };
 
 /// One-shot search among identical landmarks (common/constellation), all frames in one map.
 struct ConstellationDetectorParameters {
-  double sigma_m = 0.05;         ///< Of a landmark's position, per axis, standard deviation.
+  double sigma_m = 0.05;         ///< Standard deviation of a landmark's position, per axis.
   double max_range_m = 80.0;     ///< Landmarks farther away are left out.
-  double max_distance_m = 12.0;  ///< Frames taken farther away are not looked for.
-  /// Frames before and after the one that is found, which are compared with the query by
-  /// themselves.
+  double max_distance_m = 12.0;  ///< Frames taken farther away are not searched.
+  /// Number of frames before and after the found one that are compared with the query separately.
   std::size_t reach = 8;
 };
 
-/// Of all detectors: make_detector() takes the part that it needs.
+/// Parameters of all detectors: make_detector() uses its part.
 struct DetectorParameters {
   RangeHistogramParameters range_histogram;
   GlareParameters glare;
@@ -70,8 +69,8 @@ struct DetectorParameters {
   HierarchyDetectorParameters hierarchy;
   ConstellationDetectorParameters constellation;
   StemRecogniserParameters stems;
-  /// Where a query may lie around a frame that is alike, standard deviation per axis [m]: of
-  /// detectors that find a heading only.
+  /// Standard deviation per axis of a query's position around a similar frame [m], for detectors
+  /// that find only a heading.
   double place_sigma_m = 2.5;
 };
 

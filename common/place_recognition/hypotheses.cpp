@@ -12,12 +12,12 @@
 namespace understory::place_recognition {
 namespace {
 
-/// Hypotheses of one frame within this of each other are one [m], [rad].
+/// Hypotheses of one frame within this distance are one [m], [rad].
 constexpr double kSamePlaceM = 0.8;
 constexpr double kSameHeadingRad = 0.08;
 constexpr int kClustersPerFrame = 2;
 constexpr std::size_t kMostHypotheses = 400;
-/// What lies farther away than the reach by this share does so whatever rounding does.
+/// A distance beyond the reach by this factor is beyond it at any rounding.
 constexpr double kSurelyFarther = 1.0 + 1e-6;
 
 constellation::Triangle indexed(const StemTriangle& triangle, constellation::Slot first) {
@@ -28,7 +28,7 @@ constellation::Triangle indexed(const StemTriangle& triangle, constellation::Slo
   return result;
 }
 
-/// In a logarithm of metres; not a number where it is not known.
+/// Logarithm of metres; NaN where unknown.
 float log_of(double diameter_m) {
   return diameter_m > 0.0 ? static_cast<float>(std::log(diameter_m))
                           : std::numeric_limits<float>::quiet_NaN();
@@ -46,9 +46,9 @@ bool same_place(const Hypothesis& a, const Hypothesis& b) {
 
 using Corners = std::array<Eigen::Vector2d, 3>;
 
-/// Square of the distance between the frames by these corners [m^2], but for rounding: what
-/// align_rigid() gives, without its trigonometric functions. Most triangles that are alike are
-/// farther apart than places are looked for.
+/// Squared distance between the frames by these corners [m^2], equal to that of align_rigid()
+/// except for rounding, but without trigonometric functions. Most similar triangles are farther
+/// apart than the search allows.
 double about_m2(const Corners& frame, const Corners& query) {
   const Eigen::Vector2d frame_m = (frame[0] + frame[1] + frame[2]) / 3.0;
   const Eigen::Vector2d query_m = (query[0] + query[1] + query[2]) / 3.0;
@@ -61,13 +61,13 @@ double about_m2(const Corners& frame, const Corners& query) {
     cross += b.x() * a.y() - b.y() * a.x();
   }
   const double length = std::sqrt(dot * dot + cross * cross);
-  if (length == 0.0) return 0.0;  // No heading follows: left to align_rigid().
+  if (length == 0.0) return 0.0;  // No heading is determined: left to align_rigid().
   const Eigen::Vector2d turned_m(dot * query_m.x() - cross * query_m.y(),
                                  cross * query_m.x() + dot * query_m.y());
   return (frame_m - turned_m / length).squaredNorm();
 }
 
-/// The mean of those that agree with `seed`.
+/// The mean of the hypotheses that agree with `seed`.
 PlaceCluster cluster_around(const Hypothesis& seed, std::span<const Hypothesis> all) {
   PlaceCluster cluster{seed.frame, 0, {}};
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -118,7 +118,7 @@ std::vector<Hypothesis> TripletIndex::hypotheses(std::span<const LevelStem> stem
       if (frame >= filter.end) return true;
       for (std::size_t i = 0; i < 3; ++i) {
         const float off = log_diameters[triangle.corner[i]] - stems_[entry.vertex[i]].log_diameter;
-        // Unknown diameters agree with all: off is not a number then.
+        // Unknown diameters agree with all: `off` is then NaN.
         if (std::abs(off) > log_tolerance) return true;
       }
       const Corners corners = frame_corners(entry);

@@ -1,4 +1,4 @@
-// Triangles of stems that are alike, the poses that they mean, and where many mean the same.
+// Similar triangles of stems, their implied poses, and clusters of these poses.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,31 +13,32 @@
 
 namespace understory::place_recognition {
 
-/// A triangle of a query that is like one of a frame, and the pose that this means.
+/// The pose implied by a triangle of a query that is similar to one of a frame.
 struct Hypothesis {
   std::uint32_t frame = 0;  ///< In the order of adding.
-  float x_m = 0.0F;         ///< Of the query in the frame.
+  float x_m = 0.0F;         ///< Position of the query in the frame.
   float y_m = 0.0F;
   float heading_rad = 0.0F;
 };
 
-/// Which triangles are alike.
+/// Limits for similar triangles.
 struct HypothesisFilter {
   double side_tolerance_m = 0.25;
-  double diameter_log_tolerance = 1e9;    ///< Between the logarithms of a corner's diameters.
-  double max_distance_m = 12.0;           ///< Between the sensors.
-  std::uint32_t end = ~std::uint32_t{0};  ///< Frames from this one on are not looked for.
+  /// Largest difference between the logarithms of a corner's diameters.
+  double diameter_log_tolerance = 1e9;
+  double max_distance_m = 12.0;           ///< Largest distance between the sensors.
+  std::uint32_t end = ~std::uint32_t{0};  ///< Frames from this one on are not searched.
 };
 
 /// Triangles of many frames by their side lengths.
 class TripletIndex {
  public:
-  /// Without frames. Look-ups are fastest with about that tolerance [m].
+  /// An empty index. Look-ups are fastest with about this tolerance [m].
   explicit TripletIndex(double side_tolerance_m) : triangles_(2.0 * side_tolerance_m) {}
 
   /// Adds the next frame and its triangles.
   void add(std::span<const LevelStem> stems, std::span<const StemTriangle> triangles);
-  /// Poses by frame. O(triangles of the query * those alike).
+  /// Poses by frame. O(triangles of the query * similar ones).
   std::vector<Hypothesis> hypotheses(std::span<const LevelStem> stems,
                                      std::span<const StemTriangle> triangles,
                                      const HypothesisFilter& filter) const;
@@ -45,7 +46,7 @@ class TripletIndex {
  private:
   struct IndexedStem {
     Eigen::Vector2f position_m;
-    float log_diameter = 0.0F;  ///< Not a number where it is not known.
+    float log_diameter = 0.0F;  ///< NaN where unknown.
     std::uint32_t frame = 0;
   };
 
@@ -54,7 +55,7 @@ class TripletIndex {
   std::uint32_t frames_ = 0;
 };
 
-/// A pose to begin the verification from, and how many triangles lead to it.
+/// A start pose for the verification, and the number of its triangles.
 struct PlaceCluster {
   std::uint32_t frame = 0;
   std::uint32_t votes = 0;

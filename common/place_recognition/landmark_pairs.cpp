@@ -11,7 +11,7 @@ namespace understory::place_recognition {
 namespace {
 
 constexpr int kMostRounds = 10;
-/// Of the prior that keeps the information of few pairs invertible: standard deviations.
+/// Standard deviations of the prior that keeps the information of few pairs invertible.
 constexpr double kPriorSigmaM = 100.0;
 constexpr double kPriorSigmaRad = 10.0;
 
@@ -104,7 +104,7 @@ PairedPose refined_pose(const LandmarkSets& landmarks, const geometry::SE2& star
 
 Eigen::Matrix3d paired_covariance(const LandmarkSets& landmarks, const PairedPose& pose,
                                   double sigma_m) {
-  // d(T Exp(xi) p) = R (xi_xy + theta perpendicular(p)); R drops out of the information.
+  // d(T Exp(xi) p) = R (xi_xy + theta perpendicular(p)); R cancels in the information.
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   double squares = 0.0;
   for (const LandmarkPair& pair : pose.pairs) {

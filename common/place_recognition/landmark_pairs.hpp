@@ -1,4 +1,4 @@
-// Pairs of landmarks of two frames: the motion on which most agree, and how well it is known.
+// Pairs of landmarks of two frames: the motion on which most agree, and its covariance.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,13 +12,13 @@
 
 namespace understory::place_recognition {
 
-/// A landmark of the query and the one of the frame that it may be; indices.
+/// Indices of a landmark of the query and of a candidate in the frame.
 struct LandmarkPair {
   std::uint32_t query = 0;
   std::uint32_t frame = 0;
 };
 
-/// A relative pose and the pairs that it rests on.
+/// A relative pose and its pairs.
 struct PairedPose {
   geometry::SE2 frame_T_query;
   std::vector<LandmarkPair> pairs;
@@ -30,7 +30,7 @@ struct LandmarkSets {
   std::span<const LevelStem> frame;
 };
 
-/// The motion of the least squares over all pairs. The identity without pairs.
+/// The least-squares motion over all pairs; identity without pairs.
 geometry::SE2 aligned_pose(const LandmarkSets& landmarks, std::span<const LandmarkPair> pairs);
 
 /// The motion through two of the pairs on which most pairs agree within `gate_m` [m], aligned by
@@ -42,12 +42,12 @@ std::optional<PairedPose> most_agreed(const LandmarkSets& landmarks,
 std::vector<LandmarkPair> mutual_pairs(const LandmarkSets& landmarks,
                                        const geometry::SE2& frame_T_query, double gate_m);
 
-/// Pairs and pose, in turn, from a start until the pairs stay the same; at most ten times.
+/// Alternates pairing and alignment from a start until the pairs stay the same; at most ten times.
 PairedPose refined_pose(const LandmarkSets& landmarks, const geometry::SE2& start, double gate_m);
 
-/// Covariance of an aligned pose: the inverse of the information of its pairs, whose differences
-/// have standard deviation `sigma_m` per axis, or what the pairs show, whichever is larger. Tangent
-/// order, right perturbation. With fewer than two pairs the prior alone: 100 m, 10 rad.
+/// Covariance of an aligned pose: the inverse of the information of its pairs, with standard
+/// deviation `sigma_m` per axis or that of the residuals, whichever is larger. Tangent order, right
+/// perturbation. With fewer than two pairs the prior alone: 100 m, 10 rad.
 Eigen::Matrix3d paired_covariance(const LandmarkSets& landmarks, const PairedPose& pose,
                                   double sigma_m);
 

@@ -11,7 +11,7 @@ constexpr double kPerMetre = 200.0;
 constexpr double kFarthestM = 160.0;
 constexpr double kDiameterPerMetre = 1000.0;
 constexpr double kThickestM = 60.0;
-/// The extent ends so much beyond the stem that nine in ten are nearer than.
+/// The extent is the distance that nine in ten stems do not exceed, times this factor.
 constexpr double kBeyond = 1.05;
 
 }  // namespace

@@ -6,7 +6,7 @@
 namespace understory::place_recognition {
 namespace {
 
-/// What the truths of two frames leave open of their distance [m].
+/// Uncertainty of the distance of two frames from their truths [m].
 constexpr double kTruthSigmaM = 0.15;
 
 }  // namespace
@@ -24,7 +24,7 @@ double decades_of(const PlaceAnswer& answer, double radius_m) {
   const double sigma = std::sqrt(along.dot(covariance * along) + 2.0 * kTruthSigmaM * kTruthSigmaM);
   const double outside = 0.5 * std::erfc((radius_m - distance) / sigma / std::sqrt(2.0));
 
-  // The likeliest candidate carries the evidence; the answer agrees with it.
+  // The likeliest candidate has the evidence; the answer agrees with it.
   const double chance = std::pow(10.0, answer.candidates.front().log10_false_alarm);
   const double elsewhere = std::pow(10.0, -answer.log10_margin);
   return -std::log10(std::max(chance + elsewhere + outside, 1e-300));

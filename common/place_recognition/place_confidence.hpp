@@ -1,12 +1,12 @@
-// How sure an answer of the recogniser of stems is.
+// Confidence of an answer of the recogniser of stems.
 #pragma once
 
 #include "common/place_recognition/stem_recogniser.hpp"
 
 namespace understory::place_recognition {
 
-/// -log10 of about the probability that an answer is wrong: chance, another place, or farther from
-/// the query than `radius_m` [m] (to 0.15 m per axis and frame, which truths leave open). 0 without
+/// About -log10 of the probability that an answer is wrong: by chance, at another place, or farther
+/// from the query than `radius_m` [m] (truth is uncertain by 0.15 m per axis and frame). 0 without
 /// an answer.
 double decades_of(const PlaceAnswer& answer, double radius_m);
 

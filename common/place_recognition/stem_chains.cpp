@@ -9,11 +9,11 @@
 namespace understory::place_recognition {
 namespace {
 
-/// A stem that less than this share of the frames in whose range it is saw is doubted.
+/// A stem has less weight if fewer than this share of the frames in whose range it is saw it.
 constexpr double kExpectedShare = 0.3;
 constexpr double kLeastWeight = 0.1;
 
-/// A stem as several frames saw it.
+/// A stem seen by several frames.
 struct MergedStem {
   Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
   double seen = 0.0;
@@ -121,7 +121,7 @@ StemView StemChains::view(std::size_t frame, std::size_t end) const {
   std::vector<geometry::SE2> own_T_others;
   std::vector<double> radii_m;
 
-  // The frame itself first, then ever farther ones: its own positions attract the others.
+  // The frame itself first, then farther ones, so that its own positions determine the merged ones.
   const auto take = [&](std::size_t other) {
     if (other >= std::min(end, frames_.size()) || frames_[other].chain != own.chain) return;
     const geometry::SE2 own_T_other = own.chain_T_frame.inverse() * frames_[other].chain_T_frame;

@@ -15,8 +15,8 @@ namespace {
 
 /// Radius in which the density around a stem is counted [m].
 constexpr double kCrowdRadiusM = 4.0;
-/// What the pose leaves uncertain while it is refined, round by round: on the spot [m], and for
-/// each metre of distance.
+/// Uncertainty of the pose in each round of the refinement: at the origin [m], and per metre of
+/// distance.
 struct RefineSpread {
   double on_the_spot_m;
   double per_metre;
@@ -24,10 +24,11 @@ struct RefineSpread {
 constexpr std::array kSpreads{RefineSpread{0.20, 0.015}, RefineSpread{0.10, 0.006},
                               RefineSpread{0.03, 0.002}, RefineSpread{0.0, 0.0},
                               RefineSpread{0.0, 0.0},    RefineSpread{0.0, 0.0}};
-/// Stems farther than this many wide sigmas say nothing.
+/// Stems farther than this many wide sigmas are ignored.
 constexpr double kFarSigmas = 4.0;
 constexpr double kUnknownVariance = 1e4;
-/// Fewer diameters tell no spread; a narrower one would make every diameter telling.
+/// Fewer diameters do not determine a spread; too narrow a spread would give every diameter too
+/// much weight.
 constexpr double kLeastDiameters = 20.0;
 constexpr double kLeastSpread = 0.1;
 

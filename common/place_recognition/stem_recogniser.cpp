@@ -11,11 +11,11 @@
 namespace understory::place_recognition {
 namespace {
 
-/// Poses that are told apart, for the number of poses that chance has [m], [rad].
+/// Size of distinct poses, for the number of poses available to chance [m], [rad].
 constexpr double kPoseCellM = 0.1;
 constexpr double kPoseCellRad = 0.01;
-/// Log likelihood ratio from which two frames show one place, where the query says so already, and
-/// where it does not.
+/// Least log likelihood ratio for two frames at one place, if the query already implies it, and if
+/// not.
 constexpr double kAgreeing = 12.0;
 constexpr double kAgreeingByItself = 35.0;
 /// Two poses of one query in one frame are the same within this [m], [rad].
@@ -27,7 +27,7 @@ bool same_pose(const geometry::SE2& a, const geometry::SE2& b) {
   return off.head<2>().norm() < kSamePoseM && std::abs(off.z()) < kSamePoseRad;
 }
 
-/// The likeliest first, of each frame one.
+/// Sorts candidates, the likeliest first, one for each frame.
 void sort_candidates(std::vector<PlaceCandidate>& candidates) {
   std::ranges::sort(candidates, [](const PlaceCandidate& a, const PlaceCandidate& b) {
     return std::tuple(a.frame, -a.log_ratio) < std::tuple(b.frame, -b.log_ratio);
@@ -80,7 +80,7 @@ class StemRecogniser::Index {
   }
 
  private:
-  /// What is asked for: frames before the index `end`.
+  /// A query over frames before the index `end`.
   struct Query {
     const std::vector<LevelStem>& stems;
     std::size_t end = 0;
@@ -99,7 +99,7 @@ class StemRecogniser::Index {
     return {chains_.view(frame, end), parameters_.noise, diameters_.spread()};
   }
 
-  /// Of all frames the clusters with the most votes.
+  /// The clusters with the most votes over all frames.
   std::vector<PlaceCluster> clusters(const Query& query) const {
     HypothesisFilter filter;
     filter.side_tolerance_m = parameters_.side_tolerance_m;
@@ -122,7 +122,7 @@ class StemRecogniser::Index {
     return found;
   }
 
-  /// The query against each frame's own stems.
+  /// Compares the query with each frame's own stems.
   void compare_frames(const Query& query, std::vector<PlaceCandidate>& candidates) const {
     for (const PlaceCluster& cluster : clusters(query)) {
       const StemLikelihood frame = frame_alone(cluster.frame);
@@ -137,7 +137,7 @@ class StemRecogniser::Index {
     candidates.resize(std::min(candidates.size(), parameters_.most_views));
   }
 
-  /// The best of them against all that was seen around their frames.
+  /// Compares the best ones with the views around their frames.
   void compare_views(const Query& query, std::vector<PlaceCandidate>& candidates) const {
     for (PlaceCandidate& candidate : candidates)
       refine_in_chain(query, index_of(candidate.frame), candidate);
@@ -162,8 +162,8 @@ class StemRecogniser::Index {
       candidate.log10_false_alarm = std::log10(poses) - candidate.log_ratio / std::numbers::ln10;
   }
 
-  /// The pose of the query in the frame of `b` by what `a` says of it, if both put the query in one
-  /// place: the frames are of one chain, or their stems agree on it.
+  /// The pose of the query in the frame of `b` by candidate `a`, if both place the query equally:
+  /// the frames are in one chain, or their stems agree.
   std::optional<geometry::SE2> agreed_pose(const Query& query, const PlaceCandidate& a,
                                            const PlaceCandidate& b) const {
     const std::size_t first = index_of(a.frame);
@@ -174,7 +174,7 @@ class StemRecogniser::Index {
       const std::vector<LevelStem> other = chains_.stems(second).unpacked();
       const geometry::SE2 refined =
           view.refined(other, a.frame_T_query * b.frame_T_query.inverse());
-      // A frame that fits the query by chance fits what else saw those stems, too.
+      // A frame that fits the query by chance also fits other frames with these stems.
       const double least = b.log10_false_alarm < 0.0 ? kAgreeing : kAgreeingByItself;
       if (view.log_ratio(other, refined) > least) first_T_second = refined;
     }
@@ -183,8 +183,8 @@ class StemRecogniser::Index {
     return same_pose(pose, b.frame_T_query) ? std::optional(pose) : std::nullopt;
   }
 
-  /// Frames of the likeliest one's chain that were taken nearer to the query: those that the
-  /// triangles did not lead to.
+  /// Adds frames of the likeliest one's chain that were taken nearer to the query but not found by
+  /// triangles.
   void add_nearer_of_chain(const Query& query, PlaceAnswer& answer) const {
     const PlaceCandidate likeliest = answer.candidates.front();
     const std::size_t own = index_of(likeliest.frame);
@@ -204,7 +204,7 @@ class StemRecogniser::Index {
     }
     if (!found) return;
 
-    // The evidence is that of the chain, whatever the frame itself shows.
+    // The evidence is that of the chain, not of the frame itself.
     const geometry::SE2 predicted = found->frame_T_query;
     refine_in_chain(query, index_of(found->frame), *found);
     if (!same_pose(predicted, found->frame_T_query)) found->frame_T_query = predicted;
@@ -240,8 +240,8 @@ class StemRecogniser::Index {
     if (nearest_m > parameters_.radius_m) prefer_within_radius(answer);
   }
 
-  /// Where chance may be behind the likeliest candidate, and no frame that agrees with it is within
-  /// the radius, the likeliest one that is within it is the better guess.
+  /// If the likeliest candidate may be chance, and no agreeing frame is within the radius, the
+  /// likeliest candidate within it is the better guess.
   void prefer_within_radius(PlaceAnswer& answer) const {
     if (answer.candidates.front().log10_false_alarm < 0.0) return;
     const auto within = std::ranges::find_if(answer.candidates, [&](const PlaceCandidate& one) {

@@ -1,4 +1,4 @@
-// Which frame of stems was taken where this one was, among all that were added.
+// Place recognition by stems: finds the added frame taken at the place of a query.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,18 +19,20 @@
 
 namespace understory::place_recognition {
 
-/// What is looked for, and how hard.
+/// Limits and effort of the search.
 struct StemRecogniserParameters {
   StemNoise noise;
   StemTriangleParameters triangles;
   StemChainParameters chains;
-  double side_tolerance_m = 0.25;       ///< Between sides of one triangle in two frames.
-  double diameter_log_tolerance = 0.7;  ///< Between the logarithms of a corner's diameters.
-  double max_distance_m = 12.0;         ///< Frames taken farther away are not looked for.
-  double radius_m = 5.0;          ///< A frame taken within this is the place that is asked for.
-  std::size_t most_frames = 500;  ///< Whose own stems are compared with the query.
-  std::size_t most_views = 40;    ///< Of these, whose surroundings are compared as well.
-  double gate_m = 0.4;            ///< Pairs of stems that are told are nearer.
+  /// Largest difference between sides of one triangle in two frames.
+  double side_tolerance_m = 0.25;
+  /// Largest difference between the logarithms of a corner's diameters.
+  double diameter_log_tolerance = 0.7;
+  double max_distance_m = 12.0;   ///< Frames taken farther away are not searched.
+  double radius_m = 5.0;          ///< A frame taken within this distance is at the query's place.
+  std::size_t most_frames = 500;  ///< Number of frames whose own stems are compared with the query.
+  std::size_t most_views = 40;    ///< Number of these whose views are also compared.
+  double gate_m = 0.4;            ///< Largest distance of a reported pair of stems.
 };
 
 /// A frame that may show the place of the query.
@@ -38,41 +40,40 @@ struct PlaceCandidate {
   FrameId frame = 0;
   geometry::SE2 frame_T_query;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Tangent order, right perturbation.
-  double log_ratio = 0.0;  ///< Log likelihood (natural) over that of stems that lie anywhere.
-  /// log10 of a bound on the expected number of poses, of all poses of all frames, that explain
-  /// the query as well by chance.
+  double log_ratio = 0.0;  ///< Natural logarithm of the likelihood ratio against random stems.
+  /// log10 of a bound on the expected number of poses, over all frames, that explain the query
+  /// equally well by chance.
   double log10_false_alarm = 0.0;
-  std::uint32_t votes = 0;  ///< Triangles that led to the pose.
+  std::uint32_t votes = 0;  ///< Number of triangles for the pose.
   std::vector<StemPair> pairs;
 };
 
-/// What a query gives.
+/// Result of a query.
 struct PlaceAnswer {
   /// The likeliest first.
   std::vector<PlaceCandidate> candidates;
-  /// Index of the candidate that was taken nearest to where the query was, of those that agree with
-  /// the likeliest on where that is; where chance may be behind all of them, of the likeliest
-  /// within the radius.
+  /// Index of the candidate taken nearest to the query's place, among those that agree with the
+  /// likeliest one on this place; if all may be chance, the likeliest one within the radius.
   std::size_t nearest = 0;
-  /// Decades between the likeliest and the likeliest of those that do not agree with it; below zero
-  /// where a less likely one is answered.
+  /// Decades between the likeliest and the likeliest disagreeing candidate; below zero if a less
+  /// likely one is the answer.
   double log10_margin = 0.0;
 
-  /// The answer; none where there is no candidate.
+  /// The answer; none without candidates.
   const PlaceCandidate* best() const { return candidates.empty() ? nullptr : &candidates[nearest]; }
 };
 
-/// A database of frames. Triangles of stems find frames and poses; the likelihood of all stems, of
-/// their diameters as well, decides.
+/// A database of frames. Triangles of stems find frames and poses; the likelihood of all stems and
+/// their diameters decides.
 class StemRecogniser {
  public:
-  /// Without frames.
+  /// An empty database.
   explicit StemRecogniser(const StemRecogniserParameters& parameters = {});
   ~StemRecogniser();
   StemRecogniser(StemRecogniser&&) noexcept;
   StemRecogniser& operator=(StemRecogniser&&) noexcept;
 
-  /// Adds a frame. Precondition: its id is larger than those before.
+  /// Adds a frame. Precondition: its id is larger than all earlier ones.
   void add(FrameId id, std::span<const LevelStem> stems);
 
   /// Frames of ids up to `newest` that may show the place of these stems.
@@ -81,7 +82,7 @@ class StemRecogniser {
 
   /// Number of frames.
   std::size_t size() const;
-  /// What has to be kept of all frames [bytes]: the index follows from it.
+  /// Size of the stored data of all frames [bytes]; the index is built from it.
   std::size_t stored_bytes() const;
 
  private:

@@ -8,10 +8,10 @@
 namespace understory::place_recognition {
 namespace {
 
-/// What the index of a corner can hold.
+/// Largest value of a corner's index.
 constexpr std::size_t kMostStems = 65535;
-/// Of two neighbours within the longest side, so many are as near to each other (in a disc, by
-/// integration: 0.587).
+/// Probability that two neighbours within the longest side are also within it of each other (in a
+/// disc, by integration: 0.587).
 constexpr double kNearEachOther = 0.587;
 
 double longest_side_m(std::span<const LevelStem> stems, const StemTriangleParameters& parameters) {
@@ -22,7 +22,7 @@ double longest_side_m(std::span<const LevelStem> stems, const StemTriangleParame
   return std::min(parameters.longest_m, std::sqrt(neighbours / (std::numbers::pi * density)));
 }
 
-/// Neighbours with a higher index, nearest first, at most so many.
+/// At most `most` neighbours with a higher index, nearest first.
 std::vector<std::uint16_t> later_neighbours(std::span<const LevelStem> stems, std::size_t own,
                                             double longest_m, std::size_t most) {
   std::vector<std::pair<double, std::uint16_t>> near;

@@ -11,9 +11,9 @@
 namespace understory::place_recognition::detectors {
 namespace {
 
-/// Landmarks of one frame: their ids are consecutive.
+/// Largest number of landmarks of one frame; their ids are consecutive.
 constexpr std::size_t kMostLandmarks = 4096;
-/// 2 pi (1 - 1/golden ratio): each frame lies where the spiral has most room.
+/// 2 pi (1 - 1/golden ratio): each frame is at the largest free space of the spiral.
 const double kGoldenAngleRad = std::numbers::pi * (3.0 - std::sqrt(5.0));
 
 std::vector<constellation::ObservedPoint> observed(
@@ -27,7 +27,7 @@ std::vector<constellation::ObservedPoint> observed(
 
 }  // namespace
 
-/// Any two are more than two ranges and the greatest distance apart.
+/// The distance of any two frames is more than two ranges plus the greatest distance.
 Eigen::Vector2d ConstellationDetector::centre_m(std::size_t frame) const {
   const double apart_m = 2.0 * parameters_.max_range_m + 2.0 * parameters_.max_distance_m;
   const double radius_m = apart_m * std::sqrt(static_cast<double>(frame) + 1.0);
@@ -58,7 +58,7 @@ constellation::LocaliseParameters ConstellationDetector::search() const {
   return parameters;
 }
 
-/// The query in a map of one frame alone; none where nothing fits or the pose is too far away.
+/// Localises the query in a map of one frame; none where nothing fits or the pose is too far away.
 std::optional<ScoredPlace> ConstellationDetector::compared(const std::vector<LevelStem>& query,
                                                            std::size_t frame) const {
   constellation::ConstellationMap map;

@@ -1,4 +1,4 @@
-// Frames found again by the one-shot search among identical landmarks, all frames in one map.
+// Place recognition by the one-shot search among identical landmarks, with all frames in one map.
 #pragma once
 
 #include <cstddef>
@@ -12,11 +12,11 @@
 
 namespace understory::place_recognition::detectors {
 
-/// Every frame lies in one map at a place of its own, far from all others, on a spiral: frames up
-/// to one are those within a disc. A query is localised in that map (common/constellation): its
-/// best pose lies at one frame. That frame and those before and after it are then each searched by
-/// itself, so that the nearest of a passage are found and not only the first. The score is minus
-/// log10 of the bound on chance.
+/// All frames are in one map, each at its own position on a spiral, far from all others, so that
+/// the frames up to a given one are within a disc. A query is localised in this map
+/// (common/constellation): its best pose lies at one frame. This frame and those before and after
+/// it are then searched separately, so that the nearest frames of a passage are found, not only the
+/// first. The score is minus log10 of the bound on chance.
 class ConstellationDetector final : public PlaceDetector {
  public:
   /// Precondition: sigma and ranges > 0.

@@ -11,7 +11,7 @@ namespace {
 
 using Row = Eigen::Map<const Eigen::ArrayXf>;
 
-/// Gaussians end at so many standard deviations.
+/// Gaussians are cut off at this many standard deviations.
 constexpr double kGaussianReach = 3.0;
 
 /// The angle modulo pi, in [-pi/2, pi/2].
@@ -82,7 +82,7 @@ RowDistance GlareSignature::compare(std::span<const float> query,
                                     std::span<const float> frame) const {
   if (invariance_ == BearingInvariance::kNone) return {l1(query, frame), 0};
 
-  // A row of the query lies on the row of the frame `shift` further, round at the last one.
+  // A row of the query is compared with the frame's row `shift` further, with wrap-around.
   RowDistance best{std::numeric_limits<double>::infinity(), 0};
   for (std::size_t shift = 0; shift < parameters_.bearing_bins; ++shift) {
     const std::size_t turned = shift * parameters_.range_bins;

@@ -1,4 +1,4 @@
-// GLARE and GLAROT: histograms of how a frame's landmarks lie to each other, pair by pair.
+// GLARE and GLAROT: histograms of the relative positions of a frame's pairs of landmarks.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace understory::place_recognition::detectors {
 
-/// Whether frames that were driven through with another heading are alike.
+/// Whether frames passed with different headings are similar.
 enum class BearingInvariance {
   kNone,     ///< GLARE (Himstedt, Frost, Hellbach, Böhme & Maehle 2014).
   kShifted,  ///< GLAROT (Rizzini 2015): the smallest distance under all shifts of the bearing.
@@ -17,13 +17,13 @@ enum class BearingInvariance {
 
 /// Geometrical landmark relations (thesis 002 §2.4.1). Every pair of landmarks, of distance rho and
 /// positive bearing theta in [0, pi) (a line has no direction), adds a Gaussian over (theta, rho),
-/// sampled at the centres of the bins and cut off at three standard deviations; bearings go round
-/// at pi. The sum is normalised to 1. Two histograms differ by the L1 norm, 0 to 2; GLAROT takes
-/// the least one under the shifts of eqs. 2.24 and 2.25.
+/// sampled at the centres of the bins and cut off at three standard deviations; bearings wrap at
+/// pi. The sum is normalised to 1. Two histograms differ by the L1 norm, 0 to 2; GLAROT takes the
+/// least one under the shifts of eqs. 2.24 and 2.25.
 class GlareSignature {
  public:
-  /// Precondition: at least one bin of each, steps and sigmas > 0. `place_sigma_m`: where a query
-  /// may lie around a frame alike.
+  /// Precondition: at least one bin of each, steps and sigmas > 0. `place_sigma_m`: sigma of a
+  /// query's position around a similar frame.
   GlareSignature(const GlareParameters& parameters, BearingInvariance invariance,
                  double place_sigma_m);
 
@@ -31,9 +31,9 @@ class GlareSignature {
   std::size_t length() const { return parameters_.range_bins * parameters_.bearing_bins; }
   /// O(pairs * bins of a Gaussian). False with fewer than two landmarks in reach of each other.
   bool describe(const PlaceFrame& frame, std::span<float> row) const;
-  /// L1 norm; O(bins), of GLAROT O(bins * bins of bearing).
+  /// L1 norm; O(bins), for GLAROT O(bins * bins of bearing).
   RowDistance compare(std::span<const float> query, std::span<const float> frame) const;
-  /// The heading of the shift: of GLAROT modulo pi, so there are two.
+  /// The heading of the shift; for GLAROT it is modulo pi, so there are two.
   std::vector<geometry::SE2WithCovariance> guesses(std::size_t shift) const;
 
  private:

@@ -61,7 +61,7 @@ std::size_t Glarot3dSignature::cell_of(const Eigen::Vector3d& direction) const {
   return (face * parameters_.grid + u) * parameters_.grid + v;
 }
 
-/// A direction through the middle of a cell.
+/// The direction through the centre of a cell.
 Eigen::Vector3d Glarot3dSignature::middle_of(std::size_t cell) const {
   const auto tangent = [&](std::size_t index) {
     const double place =

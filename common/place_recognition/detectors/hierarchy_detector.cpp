@@ -11,7 +11,7 @@
 namespace understory::place_recognition::detectors {
 namespace {
 
-/// Ids are the indices of the landmarks.
+/// A hierarchy whose ids are the indices of the landmarks.
 hierarchy::GeometricHierarchy hierarchy_of(const std::vector<LevelStem>& landmarks,
                                            double max_distance) {
   std::vector<hierarchy::LandmarkPosition> positions;
@@ -50,7 +50,7 @@ std::vector<double> HierarchyDetector::votes(const PlaceFrame& frame, std::size_
   for (const hierarchy::Polygon& polygon : query.polygons()) {
     if (!polygon.exists()) continue;
     polygons_.within(polygon.descriptor, tau, hits);
-    // A frame's nearest polygon alone counts.
+    // Only a frame's nearest polygon counts.
     std::fill(nearest.begin(), nearest.end(), 0.0);
     for (const auto& hit : hits) {
       const std::size_t voted = frame_of_polygon_[hit.key];
@@ -80,7 +80,7 @@ ScoredPlace HierarchyDetector::compared(const PlaceFrame& query, std::size_t fra
   ScoredPlace place{frames_[frame].id, votes / (1.0 + votes), {}};
   const auto agreed = most_agreed(sets, pairs, parameters_.gate_m);
   if (!agreed) return place;
-  // The likeliest motion says that the frame is not the place that is asked for.
+  // By the likeliest motion the frame is not at the query's place.
   if (agreed->frame_T_query.translation().norm() > parameters_.max_distance_m) return place;
   place.score += static_cast<double>(agreed->pairs.size());
   place.guesses.push_back({agreed->frame_T_query, paired_covariance(sets, *agreed, sigma_m_)});

@@ -1,4 +1,4 @@
-// Frames found again by the polygons of their landmarks: the geometric hierarchy of thesis 000.
+// Place recognition by polygons of landmarks: the geometric hierarchy of thesis 000.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,13 @@
 namespace understory::place_recognition::detectors {
 
 /// Landmarks -> Delaunay triangles -> Urquhart polygons -> descriptors (thesis 000 §3.2). Each
-/// polygon of a query votes for every frame that has one within tau, by 1 - distance / tau. In the
-/// frames with most votes landmarks are matched through the polygons (hierarchy::match), and the
-/// score is the number of matches that agree on one motion, plus votes / (1 + votes). That motion
-/// is the guess.
+/// polygon of a query votes for every frame with a polygon within tau, with weight 1 - distance /
+/// tau. In the frames with most votes landmarks are matched through the polygons
+/// (hierarchy::match), and the score is the number of matches that agree on one motion, plus votes
+/// / (1 + votes). That motion is the guess.
 class HierarchyDetector final : public PlaceDetector {
  public:
-  /// `sigma_m`: of the difference of a landmark's positions, standard deviation per axis.
+  /// `sigma_m`: standard deviation per axis of the difference of a landmark's positions.
   HierarchyDetector(const HierarchyDetectorParameters& parameters, double sigma_m);
 
   void add(const PlaceFrame& frame) override;
@@ -40,7 +40,7 @@ class HierarchyDetector final : public PlaceDetector {
   double sigma_m_;
   std::vector<Frame> frames_;
   hierarchy::DescriptorIndex polygons_;
-  std::vector<std::uint32_t> frame_of_polygon_;  ///< By key in the index.
+  std::vector<std::uint32_t> frame_of_polygon_;  ///< Frame by key in the index.
 };
 
 }  // namespace understory::place_recognition::detectors

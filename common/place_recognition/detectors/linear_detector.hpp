@@ -1,4 +1,4 @@
-// Detectors whose frames are rows of numbers of one length, all compared with the query's.
+// Detectors that describe each frame by a row of numbers and compare all rows with the query's.
 #pragma once
 
 #include <algorithm>
@@ -13,13 +13,13 @@
 
 namespace understory::place_recognition::detectors {
 
-/// How far a frame's row is from the query's, and under which shift or rotation.
+/// Distance of a frame's row from the query's, and its shift or rotation.
 struct RowDistance {
   double distance = 0.0;  ///< Dimensionless; 0 = equal.
-  std::size_t shift = 0;  ///< Of those tried, the one of the smallest distance.
+  std::size_t shift = 0;  ///< The tried shift with the smallest distance.
 };
 
-/// The best of many, the first ones sorted: higher score first, ties by frame.
+/// Keeps the best places, sorted: higher score first, ties by frame.
 inline void keep_best(std::vector<ScoredPlace>& places, std::size_t most) {
   const auto order = [](const ScoredPlace& a, const ScoredPlace& b) {
     return std::tuple(-a.score, a.frame) < std::tuple(-b.score, b.frame);
@@ -32,11 +32,12 @@ inline void keep_best(std::vector<ScoredPlace>& places, std::size_t most) {
 
 /// Compares the query with every frame; the score is minus the distance. `Signature` is a value
 /// with
-///   std::size_t length() const;                         numbers of a row
-///   bool describe(const PlaceFrame&, std::span<float>)  false where the frame says too little
-///   RowDistance compare(std::span<const float> query, std::span<const float> frame) const
+///   std::size_t length() const; numbers of a row bool describe(const PlaceFrame&,
+///   std::span<float>) false where the frame has too little content RowDistance
+///   compare(std::span<const float> query, std::span<const float> frame) const
 ///   std::vector<geometry::SE2WithCovariance> guesses(std::size_t shift) const
-/// A frame that says too little is counted, but never found. Cost of a query: frames * compare().
+/// A frame with too little content is counted, but never found. Cost of a query: frames *
+/// compare().
 template <class Signature>
 class LinearDetector final : public PlaceDetector {
  public:
@@ -75,7 +76,7 @@ class LinearDetector final : public PlaceDetector {
   std::size_t descriptor_bytes() const override { return rows_.size() * sizeof(float); }
 
  private:
-  /// The guesses are made for those kept alone.
+  /// Guesses are made only for the kept places.
   std::vector<ScoredPlace> best_with_guesses(std::vector<ScoredPlace> places,
                                              const std::vector<std::size_t>& shifts,
                                              std::size_t most) const {
@@ -92,10 +93,10 @@ class LinearDetector final : public PlaceDetector {
   Signature signature_;
   std::vector<FrameId> ids_;
   std::vector<char> says_something_;
-  std::vector<float> rows_;  ///< length() for each frame.
+  std::vector<float> rows_;  ///< length() numbers for each frame.
 };
 
-/// A pose of which the heading alone is known. Standard deviations.
+/// A pose with known heading only. Arguments are standard deviations.
 inline geometry::SE2WithCovariance heading_guess(const geometry::SE2& frame_T_query,
                                                  double place_sigma_m, double heading_sigma_rad) {
   const double place = place_sigma_m * place_sigma_m;

@@ -11,7 +11,8 @@ namespace understory::place_recognition::detectors {
 
 /// Röhling, Mack & Schulz 2015 (thesis 002 §2.4.1): the share of the points in each of b intervals
 /// of range (eq. 2.22); two of them differ by W = 1/b sum_i |sum_{j<=i} (g_j - h_j)| (eq. 2.23,
-/// whose index of g is a misprint). Whatever the heading, it is the same; it says nothing of it.
+/// whose index of g is a misprint). The histogram is invariant to the heading and gives no
+/// information on it.
 class RangeHistogram {
  public:
   /// Precondition: at least one bin, a range > 0.
@@ -23,7 +24,7 @@ class RangeHistogram {
   bool describe(const PlaceFrame& frame, std::span<float> row) const;
   /// Wasserstein distance W; O(b).
   RowDistance compare(std::span<const float> query, std::span<const float> frame) const;
-  /// None: the histogram says nothing of the pose.
+  /// None: the histogram has no information on the pose.
   std::vector<geometry::SE2WithCovariance> guesses(std::size_t shift) const;
 
  private:

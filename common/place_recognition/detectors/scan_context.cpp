@@ -21,7 +21,7 @@ double dot(std::span<const float> a, std::span<const float> b) {
   return static_cast<double>(Values(a.data(), size).dot(Values(b.data(), size)));
 }
 
-/// Which sectors hold anything.
+/// Marks the sectors that are not empty.
 std::vector<char> occupied_sectors(const ScanContext& context, std::size_t rings) {
   std::vector<char> occupied(context.columns.size() / rings);
   for (std::size_t j = 0; j < occupied.size(); ++j) {
@@ -142,7 +142,7 @@ PackedContext packed(const ScanContext& context) {
   PackedContext result{std::vector<std::uint8_t>(context.columns.size()), context.ring_key};
   std::ranges::transform(context.columns, result.columns.begin(), [](float value) {
     const long steps = std::lround(value * kPackedSteps);
-    // What is low is not empty.
+    // A low value is not an empty bin.
     return static_cast<std::uint8_t>(value > 0.0F ? std::max(1L, steps) : 0L);
   });
   return result;
@@ -166,7 +166,7 @@ void ScanContextDetector::add(const PlaceFrame& frame) {
   contexts_.push_back(context ? std::optional(packed(*context)) : std::nullopt);
 }
 
-/// Frames before the index `end` of the least distance to any of the query's keys.
+/// Frames before the index `end` with the least distance to any of the query's keys.
 std::vector<std::size_t> ScanContextDetector::nearest_keys(std::span<const ShiftedContext> query,
                                                            std::size_t end) const {
   std::vector<std::pair<double, std::size_t>> order;

@@ -1,4 +1,4 @@
-// The recogniser of stems behind the interface of all detectors.
+// The recogniser of stems with the interface of all detectors.
 #pragma once
 
 #include "common/place_recognition/place_detector.hpp"
@@ -7,8 +7,8 @@
 namespace understory::place_recognition::detectors {
 
 /// StemRecogniser (docs/decisions/100). The first candidate is its answer; its score is the number
-/// of decades of place_recognition::decades_of(). The others follow by their own bound on chance,
-/// but never above it.
+/// of decades of place_recognition::decades_of(). The others have scores from their own bounds on
+/// chance, limited to the first one's.
 class StemDetector final : public PlaceDetector {
  public:
   /// Without frames.

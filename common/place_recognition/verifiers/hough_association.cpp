@@ -11,7 +11,7 @@
 namespace understory::place_recognition::verifiers {
 namespace {
 
-/// Votes for motions within bounds; heading by heading, in each x by x.
+/// Votes for motions within limits; ordered by heading, then x.
 class Accumulator {
  public:
   explicit Accumulator(const HoughParameters& parameters)

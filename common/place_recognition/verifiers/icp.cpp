@@ -26,7 +26,7 @@ constexpr std::size_t kLeastPartners = 4;
 /// Steps below these count as settled [m], [rad].
 constexpr double kSettledM = 1e-4;
 constexpr double kSettledRad = 1e-5;
-/// Keeps directions that no pair observes where they are.
+/// Prior that keeps directions without information unchanged.
 constexpr double kPriorInformation = 1e-6;
 
 std::vector<Eigen::Vector3d> thinned(std::span<const Eigen::Vector3f> points, std::size_t most) {
@@ -36,13 +36,13 @@ std::vector<Eigen::Vector3d> thinned(std::span<const Eigen::Vector3f> points, st
   return kept;
 }
 
-/// By how much a covariance is larger since partners change with the motion.
+/// Factor on a covariance because partners change with the motion.
 double re_association(IcpMetric metric) {
   if (metric == IcpMetric::kPointToPoint) return 6.0;
   return metric == IcpMetric::kPointToPlane ? 3.0 : 1.0;
 }
 
-/// Direction across the surface through some points; zero where they are too few.
+/// Direction across the surface through some points; zero if there are too few.
 Eigen::Vector3d normal_of(std::span<const Eigen::Vector3d> points,
                           std::span<const std::uint32_t> chosen) {
   if (chosen.size() < kLeastNeighbours) return Eigen::Vector3d::Zero();
@@ -58,7 +58,7 @@ Eigen::Vector3d normal_of(std::span<const Eigen::Vector3d> points,
 struct NormalEquations {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
-  std::map<Cube, Eigen::Vector4d> of_cubes;  ///< The gradient of the pairs in each.
+  std::map<Cube, Eigen::Vector4d> of_cubes;  ///< Gradient of the pairs in each cube.
   std::size_t pairs = 0;
 
   void add(const Jacobian& jacobian, const Eigen::Matrix3d& weight, const Eigen::Vector3d& off,
@@ -70,7 +70,7 @@ struct NormalEquations {
     if (cube) of_cubes.try_emplace(*cube, Eigen::Vector4d::Zero()).first->second += slope;
   }
 
-  /// Of the sum of all gradients, cubes taken as independent.
+  /// Covariance of the sum of all gradients, with independent cubes.
   Eigen::Matrix4d scatter() const {
     Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
     for (const auto& one : of_cubes) sum += one.second * one.second.transpose();
@@ -189,7 +189,7 @@ IcpResult icp(const IcpCloud& query, const IcpCloud& frame, IcpMetric metric,
     if (!run.step(distance_m)) break;
     const bool is_last = distance_m <= parameters.last_distance_m;
     result.converged = is_last && run.is_settled();
-    // The wide rounds need not settle: they bring the clouds near each other.
+    // The wide rounds need not settle: they only bring the clouds near each other.
     if (!is_last && (run.is_settled() || round % 4 == 3))
       distance_m = std::max(parameters.last_distance_m, 0.5 * distance_m);
   }

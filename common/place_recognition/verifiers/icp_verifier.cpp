@@ -5,7 +5,7 @@
 namespace understory::place_recognition::verifiers {
 namespace {
 
-/// Fewer points fix no pose.
+/// Fewer points do not determine a pose.
 constexpr std::size_t kLeastPoints = 5;
 
 }  // namespace

@@ -10,11 +10,11 @@
 namespace understory::place_recognition::verifiers {
 
 /// Runs ICP from each guess (from the identity without one) and takes the result with the largest
-/// share of query points that have a partner within `inlier_m`; that share is the score. Of frames
+/// share of query points with a partner within `inlier_m`; this share is the score. For frames
 /// without a cloud, the landmarks are the points.
 class IcpVerifier final : public PlaceVerifier {
  public:
-  /// Takes `icp` and `max_distance_m`.
+  /// Uses `icp` and `max_distance_m`.
   IcpVerifier(IcpMetric metric, const VerifierParameters& parameters)
       : metric_(metric), parameters_(parameters) {}
 

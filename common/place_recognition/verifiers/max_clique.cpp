@@ -34,7 +34,7 @@ VertexGraph::VertexGraph(std::size_t vertices) : neighbours_(vertices, VertexSet
 
 namespace {
 
-/// The search over a graph whose vertices are in an order of falling degree: colours are few then.
+/// The search over a graph with vertices in order of decreasing degree, which needs few colours.
 class CliqueSearch {
  public:
   CliqueSearch(const VertexGraph& graph, std::size_t most_branches)
@@ -50,7 +50,8 @@ class CliqueSearch {
  private:
   struct Coloured {
     std::uint32_t vertex = 0;
-    std::uint32_t colour = 0;  ///< A clique among this and those before has at most so many.
+    /// A clique among this vertex and those before has at most this size.
+    std::uint32_t colour = 0;
   };
 
   /// Vertices by colour; no two of one colour are neighbours.

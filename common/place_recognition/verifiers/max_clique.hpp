@@ -16,19 +16,19 @@ class VertexSet {
 
   /// Adds a vertex.
   void insert(std::size_t vertex) { words_[vertex / 64] |= std::uint64_t{1} << (vertex % 64); }
-  /// Takes a vertex out.
+  /// Removes a vertex.
   void erase(std::size_t vertex) { words_[vertex / 64] &= ~(std::uint64_t{1} << (vertex % 64)); }
-  /// Whether a vertex is in it.
+  /// Whether the set contains a vertex.
   bool contains(std::size_t vertex) const {
     return ((words_[vertex / 64] >> (vertex % 64)) & 1) != 0;
   }
-  /// Whether there is none.
+  /// Whether the set is empty.
   bool empty() const;
   /// Number of vertices.
   std::size_t count() const;
-  /// Keeps those that are in `other` as well.
+  /// Intersects with `other`.
   void intersect(const VertexSet& other);
-  /// Keeps those that are not in `other`.
+  /// Removes the vertices of `other`.
   void subtract(const VertexSet& other);
   /// The smallest vertex. Precondition: not empty.
   std::size_t first() const;
@@ -59,15 +59,15 @@ class VertexGraph {
   std::vector<VertexSet> neighbours_;
 };
 
-/// What the search found.
+/// Result of the search.
 struct Clique {
   std::vector<std::uint32_t> vertices;  ///< Ascending.
-  bool is_largest = false;              ///< False where the search ended before it was sure.
+  bool is_largest = false;              ///< False if the search ended before the proof.
 };
 
 /// Branch and bound with greedy colouring (Tomita & Seki 2003; bit sets as San Segundo et al.
-/// 2011). After `most_branches` branches the largest clique so far is given: at least that of the
-/// first greedy descent. Exponential in the worst case, hence the bound.
+/// 2011). After `most_branches` branches the largest clique so far is returned: at least that of
+/// the first greedy descent. Exponential in the worst case, hence the limit.
 Clique max_clique(const VertexGraph& graph, std::size_t most_branches);
 
 }  // namespace understory::place_recognition::verifiers

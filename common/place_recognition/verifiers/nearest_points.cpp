@@ -6,7 +6,7 @@
 namespace understory::place_recognition::verifiers {
 
 struct NearestPoints::Tree {
-  /// What nanoflann asks of a set of points; names are its own.
+  /// nanoflann's interface of a set of points; names are nanoflann's.
   struct Cloud {
     std::vector<Eigen::Vector3d> points;
 

@@ -1,4 +1,4 @@
-// Nearest neighbours in a cloud of points; nanoflann stays behind it.
+// Nearest neighbours in a cloud of points, by nanoflann.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@ namespace understory::place_recognition::verifiers {
 /// A k-d tree over points.
 class NearestPoints {
  public:
-  /// Keeps a copy of the points, which are finite [m].
+  /// Copies the points [m]. Precondition: all are finite.
   explicit NearestPoints(std::vector<Eigen::Vector3d> points_m);
   ~NearestPoints();
   NearestPoints(NearestPoints&&) noexcept;

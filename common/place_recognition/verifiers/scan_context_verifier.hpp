@@ -1,4 +1,4 @@
-// Scan Context as a verifier: it needs no landmark.
+// Scan Context as a verifier: it needs no landmarks.
 #pragma once
 
 #include <optional>
@@ -10,11 +10,11 @@
 namespace understory::place_recognition::verifiers {
 
 /// One minus the distance of two frames' contexts (thesis 002 §6.3: independent of landmarks). The
-/// pose is the heading of the best shift; its translation is that of the root shift alone, with
-/// standard deviation `place_sigma_m`. Counts no inliers. Needs no guess.
+/// pose has the heading of the best shift, and the translation of the root shift alone, with
+/// standard deviation `place_sigma_m`. It counts no inliers. Needs no guess.
 class ScanContextVerifier final : public PlaceVerifier {
  public:
-  /// Takes `scan_context` and `place_sigma_m`.
+  /// Uses `scan_context` and `place_sigma_m`.
   explicit ScanContextVerifier(const VerifierParameters& parameters)
       : maker_(parameters.scan_context), place_sigma_m_(parameters.place_sigma_m) {}
 

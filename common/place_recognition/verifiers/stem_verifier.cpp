@@ -12,15 +12,15 @@
 namespace understory::place_recognition::verifiers {
 namespace {
 
-/// Poses that are refined, those of most triangles first.
+/// Largest number of poses to refine, those with the most triangles first.
 constexpr std::size_t kMostStarts = 8;
-/// A guess that is known worse is no start: the likelihood has many peaks [m], [rad].
+/// A guess with a larger sigma is no start, because the likelihood has many peaks [m], [rad].
 constexpr double kKnownM = 1.0;
 constexpr double kKnownRad = 0.1;
-/// Pairs that are told are nearer [m].
+/// Largest distance of a reported pair [m].
 constexpr double kGateM = 0.4;
 
-/// Poses at which the search begins.
+/// Start poses of the search.
 std::vector<geometry::SE2> starts_of(std::span<const LevelStem> query,
                                      std::span<const LevelStem> frame,
                                      std::span<const geometry::SE2WithCovariance> guesses,

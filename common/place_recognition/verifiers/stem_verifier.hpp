@@ -8,12 +8,12 @@
 
 namespace understory::place_recognition::verifiers {
 
-/// Triangles that both frames have give poses, and so do guesses that are known to a metre; the
-/// likelihood of all stems (stem_likelihood.hpp) decides. The score is the natural logarithm of the
-/// likelihood over that of stems that lie anywhere. Needs no guess.
+/// Start poses are from common triangles of both frames, and from guesses with a sigma below a
+/// metre; the likelihood of all stems (stem_likelihood.hpp) decides. The score is the natural
+/// logarithm of the likelihood ratio against random stems. Needs no guess.
 class StemVerifier final : public PlaceVerifier {
  public:
-  /// Takes `stems`, `triangles` and `max_distance_m`.
+  /// Uses `stems`, `triangles` and `max_distance_m`.
   explicit StemVerifier(const VerifierParameters& parameters) : parameters_(parameters) {}
 
   std::optional<VerifiedPlace> verify(
