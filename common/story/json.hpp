@@ -7,7 +7,7 @@
 
 namespace understory::story {
 
-/// The object; parts that are empty are left out, and so is `ms` where it is not known.
+/// The JSON object; empty parts and an unknown `ms` are left out.
 inline nlohmann::ordered_json story_json(const Story& story) {
   using Json = nlohmann::ordered_json;
   Json json{{"title", story.title}};

@@ -117,7 +117,7 @@ void LandmarkBook::note(LandmarkRecord& record, LandmarkEvent event) {
 void LandmarkBook::born(model::LandmarkId id, bool with_its_map, model::Utime utime,
                         MomentNumber moment) {
   LandmarkRecord& record = records_.touch(id);
-  // MAP_DELTA tells of it as well, and may have come before.
+  // MAP_DELTA reports it too, and may have arrived before.
   const bool is_news = record.origin == Origin::kNotTold ||
                        (record.origin == Origin::kByMapChange && record.told_utime == utime);
   const bool is_anew = !is_news && with_its_map;
@@ -134,7 +134,7 @@ void LandmarkBook::born(model::LandmarkId id, bool with_its_map, model::Utime ut
 
 void LandmarkBook::seen(model::LandmarkId id, const Sight& sight, MomentNumber moment) {
   LandmarkRecord& record = records_.touch(id);
-  // Two landmarks of a keyframe may be one.
+  // Two landmarks of a keyframe may be the same landmark of the map.
   if (record.seen > 0 && record.last_seen == moment) return;
   const std::uint32_t placed = moments_.find(moment)->placed;
   if (record.seen == 0) {
@@ -157,7 +157,7 @@ void LandmarkBook::missed(model::LandmarkId id, MomentNumber moment) {
   record.looks.push({moment, 0}, limits_.looks, records_.budget());
 }
 
-/// SLAM_UPDATE and MAP_DELTA both tell of it.
+/// SLAM_UPDATE and MAP_DELTA both report a merge.
 void LandmarkBook::merged(model::LandmarkId old_id, model::LandmarkId new_id, MomentNumber moment) {
   LandmarkRecord& old = records_.touch(old_id);
   if (old.fate == Fate::kMerged && old.survivor == new_id) return;

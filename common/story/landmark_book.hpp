@@ -1,4 +1,4 @@
-// What became of every landmark, from the messages about the map.
+// The history of every landmark, from the messages on the map.
 #pragma once
 
 #include <cstdint>
@@ -15,41 +15,41 @@
 namespace understory::story {
 
 /// Follows SLAM_UPDATE, MAP_DELTA, MAP, EXISTENCE, SUBMAP and MAP_CORRECTION. Each message costs
-/// O(landmarks that it names).
+/// O(landmarks in it).
 class LandmarkBook {
  public:
-  /// Where a submap was when it was handed over, and where it is.
+  /// Pose of a submap at its handover, and now.
   struct SubmapPlace {
     geometry::SE2 then_map_T_submap;
     geometry::SE2 now_map_T_submap;
   };
 
-  /// Keeps `limits.landmarks` landmarks in `bytes`, or as many as go into that.
+  /// Stores at most `limits.landmarks` landmarks in at most `bytes`.
   LandmarkBook(const Limits& limits, std::size_t bytes);
 
-  /// Takes what a keyframe did; one that was not placed says nothing of landmarks.
+  /// Takes a keyframe's update; one without a pose has no information on landmarks.
   void take(const model::MapUpdate& update);
   void take(const model::MapDelta& delta);            ///< Takes a change of the map.
-  void take(const model::WholeMap& map);              ///< Takes the map; one that is cut as well.
+  void take(const model::WholeMap& map);              ///< Takes the map, also a cut one.
   void take(const model::Existence& existence);       ///< Takes probabilities.
-  void take(const model::Submap& submap);             ///< Takes what was handed over.
-  void take(const model::MapCorrection& correction);  ///< Takes where the submaps are.
+  void take(const model::Submap& submap);             ///< Takes a submap handed over.
+  void take(const model::MapCorrection& correction);  ///< Takes the poses of the submaps.
 
   /// The record of a landmark, or null. O(1).
   const LandmarkRecord* find(model::LandmarkId id) const { return records_.find(id); }
-  /// The moment of this number; null where it had to go.
+  /// The moment of this number; null if it was dropped.
   const Moment* moment(MomentNumber number) const { return moments_.find(number); }
-  /// Where it is now, frame map: submaps may have moved since. Precondition: `has_position`.
+  /// Its present position, frame map, after moves of submaps. Precondition: `has_position`.
   Eigen::Vector2d position_m(const LandmarkRecord& record) const;
-  /// Whether the latest whole MAP of its map should have listed it and did not.
+  /// Whether the latest complete MAP of its map unexpectedly does not contain it.
   bool is_left_out(const LandmarkRecord& record) const;
 
-  /// The map of the last placed keyframe; 0 before any.
+  /// The map of the last placed keyframe; 0 before the first one.
   std::uint32_t map_in_use() const { return map_in_use_; }
-  const LandmarkRecords& records() const { return records_; }  ///< All.
-  /// Held, without the submaps.
+  const LandmarkRecords& records() const { return records_; }  ///< All records.
+  /// Memory held [bytes], without the submaps.
   std::size_t bytes() const { return records_.bytes() + moments_.bytes(); }
-  static std::size_t fixed_bytes(const Limits& limits);  ///< Of moments and submaps, at most.
+  static std::size_t fixed_bytes(const Limits& limits);  ///< Largest memory of moments and submaps.
 
  private:
   void born(model::LandmarkId id, bool with_its_map, model::Utime utime, MomentNumber moment);
@@ -65,8 +65,8 @@ class LandmarkBook {
   Moments moments_;
   LandmarkRecords records_;
   std::uint32_t map_in_use_ = 0;
-  std::uint32_t wholes_ = 0;                             ///< MAP messages, complete ones.
-  std::map<std::uint32_t, std::uint32_t> latest_whole_;  ///< Of a map, the number of its last MAP.
+  std::uint32_t wholes_ = 0;                             ///< Number of complete MAP messages.
+  std::map<std::uint32_t, std::uint32_t> latest_whole_;  ///< Number of the last MAP of each map.
   std::map<std::pair<std::uint32_t, model::SubmapId>, SubmapPlace> submaps_;
 };
 

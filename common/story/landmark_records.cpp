@@ -15,7 +15,7 @@ LandmarkRecord& LandmarkRecords::touch(model::LandmarkId id) {
   return records_[place];
 }
 
-/// So that the newest one can grow.
+/// Frees memory so that the newest record can grow.
 void LandmarkRecords::make_room() {
   constexpr std::size_t kRoomBytes = 65'536;
   while (budget_.left() < kRoomBytes) {
@@ -45,7 +45,7 @@ void LandmarkRecords::begin_again(LandmarkRecord& record) {
   record = std::move(fresh);
 }
 
-/// A place that is in no order yet.
+/// A free index that is not in the order yet.
 std::uint32_t LandmarkRecords::place_for(model::LandmarkId id) {
   std::uint32_t place = 0;
   if (records_.size() < limit_) {

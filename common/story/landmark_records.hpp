@@ -1,4 +1,4 @@
-// Records of landmarks by id; the one that was not spoken of for longest gives way.
+// Records of landmarks by id; the least recently used one is dropped first.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace understory::story {
 
-/// Bounded store of records. Where bytes run short, the records that were not spoken of for longest
-/// keep the newest of what happened to them only; where places do, they are forgotten.
+/// Bounded store of records. If memory is short, the least recently used records keep only their
+/// newest events; if the number of records is too large, they are dropped.
 class LandmarkRecords {
  public:
   /// Bytes of a landmark with the first block of each ring.
@@ -18,25 +18,25 @@ class LandmarkRecords {
     return kRecordBytes + 3 * Ring<Look>::kFirstBytes;
   }
 
-  /// Keeps as many landmarks as go into `bytes`, at most `limit`, at least two.
+  /// Stores as many landmarks as fit into `bytes`, at most `limit`, at least two.
   LandmarkRecords(std::size_t limit, std::size_t bytes);
 
-  /// The record, now the newest; an empty one where the id is not known. Takes the place of the
-  /// oldest where there are too many. Amortised O(1).
+  /// The record, marked as most recently used; a new one for an unknown id, which replaces the
+  /// oldest if there are too many. Amortised O(1).
   LandmarkRecord& touch(model::LandmarkId id);
   /// The record, or null. O(1).
   const LandmarkRecord* find(model::LandmarkId id) const;
-  /// Makes the record an empty one.
+  /// Clears the record.
   void begin_again(LandmarkRecord& record);
 
-  const std::deque<LandmarkRecord>& all() const { return records_; }  ///< In no order.
-  std::uint64_t forgotten() const { return forgotten_; }              ///< Records that had to go.
-  Budget& budget() { return budget_; }                                ///< For what the rings hold.
-  std::size_t bytes() const { return budget_.used(); }                ///< Held now.
+  const std::deque<LandmarkRecord>& all() const { return records_; }  ///< Records in no order.
+  std::uint64_t forgotten() const { return forgotten_; }  ///< Number of dropped records.
+  Budget& budget() { return budget_; }                    ///< Memory budget of the rings.
+  std::size_t bytes() const { return budget_.used(); }    ///< Memory held now [bytes].
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
-  /// With its place in the index, and what the allocator adds.
+  /// Bytes of a record, its index entry and the allocator's overhead.
   static constexpr std::size_t kRecordBytes = sizeof(LandmarkRecord) + 80;
   std::uint32_t place_for(model::LandmarkId id);
   void make_room();
@@ -50,7 +50,7 @@ class LandmarkRecords {
   std::unordered_map<model::LandmarkId, std::uint32_t> place_of_;
   std::uint32_t newest_ = kNone;
   std::uint32_t oldest_ = kNone;
-  std::uint32_t trimmed_ = kNone;  ///< This one and all older ones hold first blocks only.
+  std::uint32_t trimmed_ = kNone;  ///< This record and all older ones have only their first blocks.
 };
 
 }  // namespace understory::story

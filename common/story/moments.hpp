@@ -1,4 +1,4 @@
-// The keyframes of a drive, to which everything that happens to landmarks refers by number.
+// The keyframes of a drive; events of landmarks refer to them by number.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,31 +9,31 @@
 
 namespace understory::story {
 
-/// A stamp at which something happened to landmarks; of a keyframe, where it was.
+/// A stamp of events of landmarks; for a keyframe also its position.
 struct Moment {
   model::Utime utime = 0;
-  std::uint64_t keyframe = 0;           ///< Its sequence; where `placed` > 0.
-  Eigen::Vector2d vehicle_m{0.0, 0.0};  ///< Of the keyframe's base, frame map.
+  std::uint64_t keyframe = 0;           ///< Its sequence; valid if `placed` > 0.
+  Eigen::Vector2d vehicle_m{0.0, 0.0};  ///< Position of the keyframe's base, frame map.
   std::uint32_t placed = 0;             ///< Number among the placed keyframes, from 1; 0 = none.
   model::MapUpdateStatus status = model::MapUpdateStatus::kRejected;
 
-  /// Whether a keyframe's SLAM_UPDATE came with it.
+  /// Whether it has a keyframe's SLAM_UPDATE.
   bool has_keyframe() const { return placed > 0; }
 };
 
 /// The latest moments by number.
 class Moments {
  public:
-  /// Keeps so many.
+  /// Stores at most `limit` moments.
   explicit Moments(std::size_t limit) : moments_(limit) {}
-  /// A placed keyframe; gives its number.
+  /// Adds a placed keyframe; returns its number.
   std::uint32_t add(const model::MapUpdate& update);
-  /// Number of the latest moment of this stamp; a new one where the last 64 have another. O(1).
+  /// Number of the latest moment with this stamp; adds one if the last 64 have other stamps. O(1).
   std::uint32_t at(model::Utime utime);
-  /// The moment of this number; null where it had to go.
+  /// The moment of this number; null if it was dropped.
   const Moment* find(std::uint32_t number) const;
 
-  std::size_t bytes() const { return moments_.bytes(); }  ///< Held.
+  std::size_t bytes() const { return moments_.bytes(); }  ///< Memory held [bytes].
 
  private:
   std::uint32_t latest() const { return static_cast<std::uint32_t>(moments_.heard() - 1); }

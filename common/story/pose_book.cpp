@@ -11,7 +11,7 @@ constexpr std::size_t kReasonBytes = 200;
 constexpr std::size_t kScansNamed = 64;
 constexpr std::size_t kAllocated = 16;  // What the allocator adds [bytes].
 
-/// Parts of a revolution come within a few others.
+/// Finds the revolution of a part; parts arrive within a few messages.
 LaserRecord* begun(History<LaserRecord>& channel, const model::PointSweep& part) {
   constexpr std::size_t kMixed = 4;
   for (std::size_t back = 1; back <= std::min(channel.size(), kMixed); ++back) {
@@ -157,7 +157,7 @@ void PoseBook::take(const model::PointSweep& part, bool is_raw, std::int64_t rec
 }
 
 const ScanRecord* PoseBook::scan_of(const PoseRecord& pose) const {
-  // The scan comes shortly before its pose.
+  // The scan arrives shortly before its pose.
   auto one = std::ranges::partition_point(
       scans_, [&](const ScanRecord& scan) { return scan.arrival.order < pose.arrival.order; });
   while (one != scans_.begin()) {

@@ -19,10 +19,10 @@
 
 namespace understory::story {
 
-/// When a message came.
+/// Arrival of a message.
 struct Arrival {
-  std::int64_t received_us = 0;  ///< Wall clock; 0 = not known.
-  std::uint64_t order = 0;       ///< Counts all messages that were taken.
+  std::int64_t received_us = 0;  ///< Wall clock; 0 = unknown.
+  std::uint64_t order = 0;       ///< Running number over all messages.
 };
 
 /// A SLAM_POSE.
@@ -85,14 +85,14 @@ struct MotionRecord {
 struct FilterRecord {
   Arrival arrival;
   model::Utime utime = 0;
-  double sigma_m = 0.0;  ///< Largest of its position.
+  double sigma_m = 0.0;  ///< Largest sigma of its position.
   std::uint32_t landmarks_used = 0;
   std::uint32_t landmarks_refused = 0;
 };
 
-/// A revolution of a laser; its parts are one.
+/// A revolution of a laser; its parts are merged.
 struct LaserRecord {
-  Arrival arrival;  ///< Of the last part.
+  Arrival arrival;  ///< Arrival of the last part.
   std::int64_t first_received_us = 0;
   model::Utime utime = 0;
   std::uint64_t revolution = 0;
@@ -116,7 +116,7 @@ class PoseBook {
   enum class Laser : std::uint8_t { kRawScan, kRawSweep, kScan, kSweep };
   static constexpr std::size_t kLasers = 4;
 
-  /// Keeps as many as `limits` allow.
+  /// Stores as many messages as `limits` allow.
   explicit PoseBook(const Limits& limits);
 
   void take(const model::SlamPose& pose, std::int64_t received_us);
@@ -142,17 +142,18 @@ class PoseBook {
     return lasers_[static_cast<std::size_t>(channel)];
   }
 
-  /// The scan that a pose is of; null where it was not heard, or had to go.
-  /// O(log(held)) where it came shortly before, else O(held).
+  /// The scan of a pose; null if it was not received or was dropped. O(log(stored)) if it arrived
+  /// shortly before, else O(stored).
   const ScanRecord* scan_of(const PoseRecord& pose) const;
-  /// From the sensor's stamp to the pose where their clocks agree, else from LANDMARKS to the pose
-  /// [ms]; none where times are not known. O(log(scans held)) as a rule.
+  /// Time from the sensor's stamp to the pose if their clocks agree, else from LANDMARKS to the
+  /// pose [ms]; none where times are unknown. Usually O(log(stored scans)).
   std::optional<double> latency_ms(const PoseRecord& pose) const;
-  /// Whether receive times tell nothing: a replay gives all that comes of one input the same one.
+  /// Whether reception times are meaningless: in a replay all messages derived from one input have
+  /// the same one.
   bool is_replayed() const;
 
-  std::size_t bytes() const;                             ///< Held now, about.
-  static std::size_t fixed_bytes(const Limits& limits);  ///< At most.
+  std::size_t bytes() const;                             ///< Approximate memory held now [bytes].
+  static std::size_t fixed_bytes(const Limits& limits);  ///< Upper limit of the memory [bytes].
 
  private:
   Arrival arrive(std::int64_t received_us);
@@ -168,13 +169,13 @@ class PoseBook {
   std::vector<History<LaserRecord>> lasers_;
   std::uint64_t order_ = 0;
   std::int64_t last_received_us_ = 0;
-  std::uint64_t poses_at_once_ = 0;    ///< With the receive time of the message before.
-  std::uint64_t updates_at_once_ = 0;  ///< Likewise.
+  std::uint64_t poses_at_once_ = 0;    ///< Poses with the reception time of the previous message.
+  std::uint64_t updates_at_once_ = 0;  ///< Updates with the reception time of the previous message.
 };
 
 /// Milliseconds from one receive time or stamp to another [us].
 double milliseconds(std::int64_t from_us, std::int64_t to_us);
-/// Whether a stamp can be of the clock by which messages are received: at most a minute before.
+/// Whether a stamp may belong to the clock of reception: at most a minute earlier.
 bool is_same_clock(model::Utime stamp, std::int64_t received_us);
 /// Largest standard deviation of the position [m].
 double largest_sigma_m(const Eigen::Matrix3d& covariance);

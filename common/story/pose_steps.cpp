@@ -8,7 +8,7 @@
 namespace understory::story {
 namespace {
 
-/// Collects steps; what is on the way gets the time since the one before.
+/// Collects steps; a step on the way gets the time since the previous one.
 class WayToPose {
  public:
   WayToPose(const PoseBook& book, const PoseRecord& pose)
@@ -40,9 +40,9 @@ class WayToPose {
   void aside(std::string name, std::string text) {
     steps_.push_back({std::move(name), std::move(text), std::nullopt});
   }
-  /// Came before the pose.
+  /// Whether it arrived before the pose.
   bool before(const Arrival& arrival) const { return arrival.order < pose_.arrival.order; }
-  /// Why a message is not there.
+  /// The reason why a message is missing.
   template <class T>
   static std::string missing(const History<T>& channel, std::string_view which) {
     if (channel.heard() == 0) return "not among the messages: this channel was not recorded";
@@ -50,7 +50,7 @@ class WayToPose {
     return fmt::format("none {}; {}", which, dropped_words("ones", channel.dropped()));
   }
 
-  /// Raw and processed, of a plane or in parts.
+  /// Adds raw and processed laser data, planar or in parts.
   void lasers() {
     using enum PoseBook::Laser;
     const bool has_plane = book_.laser(kRawScan).heard() + book_.laser(kScan).heard() > 0;
@@ -70,8 +70,8 @@ class WayToPose {
       return one.utime == pose_.pose.utime && before(one.arrival);
     });
   }
-  /// A sweep's stamp is that of its end, the raw one's that of its begin: the revolution tells. A
-  /// scan of a plane that was de-skewed is a sweep, too.
+  /// A sweep's stamp is its end, a raw sweep's stamp its begin: the revolution connects them. A
+  /// de-skewed planar scan is a sweep too.
   void raw_laser(bool in_plane) {
     using enum PoseBook::Laser;
     const bool is_scan =
@@ -109,7 +109,7 @@ class WayToPose {
         found->arrival);
   }
 
-  /// What else was known when the pose was made.
+  /// Adds other messages available when the pose was made.
   void beside() {
     motion();
     const ScanRecord* const tracked = book_.tracked().newest([&](const ScanRecord& one) {
@@ -162,7 +162,7 @@ class WayToPose {
                                                              : "its source alone"));
   }
 
-  /// The keyframe that decided, or the last one before a pose between keyframes.
+  /// The keyframe that determined the pose, or the last one before a pose between keyframes.
   void decision() {
     const auto number = pose_.pose.keyframe_sequence;
     const UpdateRecord* const update = book_.updates().newest([&](const UpdateRecord& one) {
@@ -180,7 +180,7 @@ class WayToPose {
     step("SLAM_UPDATE", update == nullptr ? missing(book_.updates(), wanted) : words(*update),
          update == nullptr ? nullptr : &update->arrival, number.has_value());
   }
-  /// On the way where the pose came of it, else beside it.
+  /// Adds a step: on the way if the pose is derived from it, else beside it.
   void step(const char* name, std::string text, const Arrival* arrival, bool is_on_the_way) {
     if (arrival != nullptr && is_on_the_way) return on_the_way(name, std::move(text), *arrival);
     aside(name, std::move(text));

@@ -1,4 +1,4 @@
-// The latest values of something, in bounded memory.
+// Ring buffers of the latest values, in bounded memory.
 #pragma once
 
 #include <algorithm>
@@ -10,18 +10,18 @@
 
 namespace understory::story {
 
-/// Bytes that many owners share.
+/// A memory budget [bytes] shared by many owners.
 class Budget {
  public:
   /// `limit` bytes in all.
   explicit Budget(std::size_t limit) : limit_(limit) {}
-  /// Takes bytes where that many are left; false = nothing was taken.
+  /// Takes bytes if that many are left; false = nothing was taken.
   bool take_if_left(std::size_t bytes) {
     if (bytes > left()) return false;
     used_ += bytes;
     return true;
   }
-  /// Takes what cannot be refused.
+  /// Takes bytes without a check.
   void take(std::size_t bytes) { used_ += bytes; }
   /// Gives bytes back.
   void give_back(std::size_t bytes) { used_ -= bytes; }
@@ -34,13 +34,14 @@ class Budget {
 };
 
 /// The latest values of one owner among many. Starts without memory; its first block is always
-/// granted, more while it is below its quota and the budget has room. Then the oldest values go.
+/// granted, more while it is below its quota and the budget has room. Then the oldest values are
+/// dropped.
 template <class T>
 class Ring {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  /// Bytes of the first block, with what the allocator adds.
+  /// Bytes of the first block, with the allocator's overhead.
   static constexpr std::size_t kFirstBytes = 48;
 
   /// Appends; amortised O(1).
@@ -54,23 +55,23 @@ class Ring {
     }
     ++total_;
   }
-  /// Forgets all, and that there was anything.
+  /// Drops all values and resets the counts.
   void clear(Budget& budget) {
     if (capacity_ > 0) budget.give_back(bytes_of(capacity_));
     *this = Ring();
   }
-  /// Back to the first block: keeps the newest values of that many.
+  /// Shrinks to the first block, with the newest values.
   void trim(Budget& budget) {
     if (capacity_ <= kFirst) return;
     budget.give_back(bytes_of(capacity_) - bytes_of(kFirst));
     hold(kFirst);
   }
 
-  std::uint32_t size() const { return size_; }              ///< Values held.
-  std::uint32_t dropped() const { return total_ - size_; }  ///< Values that had to go.
-  /// The value at this place; 0 = the oldest one held.
+  std::uint32_t size() const { return size_; }              ///< Number of stored values.
+  std::uint32_t dropped() const { return total_ - size_; }  ///< Number of dropped values.
+  /// The value at this index; 0 = the oldest stored one.
   const T& operator[](std::uint32_t i) const { return values_[(head_ + i) % capacity_]; }
-  /// The newest one. Precondition: there is one.
+  /// The newest value. Precondition: not empty.
   const T& back() const { return (*this)[size_ - 1]; }
 
  private:
@@ -91,7 +92,7 @@ class Ring {
     const std::uint32_t wanted = std::min(quota, 2 * capacity_);
     if (budget.take_if_left(bytes_of(wanted) - bytes_of(capacity_))) hold(wanted);
   }
-  /// Moves the newest values into a block for so many.
+  /// Moves the newest values into a block of this capacity.
   void hold(std::uint32_t capacity) {
     auto values = std::make_unique<T[]>(capacity);
     const std::uint32_t kept = std::min(size_, capacity);
@@ -113,9 +114,9 @@ class Ring {
 template <class T>
 class History {
  public:
-  /// Keeps so many, at least one.
+  /// Stores at most `limit` messages, at least one.
   explicit History(std::size_t limit) : limit_(std::max<std::size_t>(limit, 1)) {}
-  /// Appends; the oldest one goes where there are too many.
+  /// Appends; drops the oldest one if there are too many.
   T& push(T value) {
     if (values_.size() == limit_) {
       values_.pop_front();
@@ -124,31 +125,31 @@ class History {
     values_.push_back(std::move(value));
     return values_.back();
   }
-  std::size_t size() const { return values_.size(); }        ///< Messages held.
-  std::uint64_t dropped() const { return dropped_; }         ///< Messages that had to go.
-  std::uint64_t heard() const { return size() + dropped_; }  ///< All that came.
-  /// The message at this place; 0 = the oldest one held.
+  std::size_t size() const { return values_.size(); }        ///< Number of stored messages.
+  std::uint64_t dropped() const { return dropped_; }         ///< Number of dropped messages.
+  std::uint64_t heard() const { return size() + dropped_; }  ///< Number of all received messages.
+  /// The message at this index; 0 = the oldest stored one.
   const T& operator[](std::size_t i) const { return values_[i]; }
-  /// Likewise, to be completed.
+  /// The same for completion.
   T& at(std::size_t i) { return values_[i]; }
 
-  /// The newest message for which `is_it`; null where there is none. O(held).
+  /// The newest message for which `is_it` is true; null = none. O(stored).
   template <class IsIt>
   const T* newest(const IsIt& is_it) const {
     const auto found = std::find_if(values_.rbegin(), values_.rend(), is_it);
     return found == values_.rend() ? nullptr : &*found;
   }
-  /// What so many messages take in memory, with the blocks of a deque; what they point to apart.
+  /// Memory of this many messages, with the blocks of a deque, without memory that they point to.
   static constexpr std::size_t bytes_of(std::size_t messages) {
     constexpr std::size_t kBlock = 512;
     constexpr std::size_t kOfBlock = 24;  // For the allocator, and for the list of blocks.
     constexpr std::size_t kInBlock = std::max<std::size_t>(1, kBlock / sizeof(T));
     return (messages + kInBlock - 1) / kInBlock * (kInBlock * sizeof(T) + kOfBlock);
   }
-  std::size_t bytes() const { return bytes_of(size()); }  ///< Likewise, of those held.
+  std::size_t bytes() const { return bytes_of(size()); }  ///< The same for the stored ones.
 
   auto begin() const { return values_.begin(); }  ///< Oldest first.
-  auto end() const { return values_.end(); }      ///< Behind the newest one.
+  auto end() const { return values_.end(); }      ///< After the newest one.
 
  private:
   std::size_t limit_;

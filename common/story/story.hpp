@@ -1,4 +1,4 @@
-// What is told about a landmark or a pose: a value without any form.
+// The story of a landmark or a pose as a value, independent of its presentation.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,7 @@
 
 namespace understory::story {
 
-/// Something that happened.
+/// An event.
 struct StoryEvent {
   model::Utime utime = 0;
   std::string text;
@@ -20,8 +20,8 @@ struct StoryEvent {
 /// A quantity over time.
 struct StorySeries {
   std::string name;
-  std::string unit;             ///< Empty where it has none.
-  std::vector<model::Utime> t;  ///< As long as `v`, not descending unless the stamps were.
+  std::string unit;             ///< Empty = no unit.
+  std::vector<model::Utime> t;  ///< Same size as `v`; ascending unless the stamps were not.
   std::vector<double> v;
 };
 
@@ -29,7 +29,8 @@ struct StorySeries {
 struct StoryStep {
   std::string name;  ///< Its channel.
   std::string text;
-  std::optional<double> ms;  ///< Spent there; none where it is not known, or beside the way.
+  std::optional<double>
+      ms;  ///< Time spent there; none where unknown, or for a message beside the way.
 };
 
 /// The answer to a question, in parts; any of them may be empty.
@@ -38,14 +39,14 @@ struct Story {
   std::vector<std::pair<std::string, std::string>> facts;  ///< Name and value.
   std::vector<StoryEvent> events;                          ///< In order of time.
   std::vector<StorySeries> series;
-  std::vector<Eigen::Vector2d> seen_from;  ///< Places of the vehicle [m], frame map.
-  std::vector<StoryStep> steps;            ///< From the sensor on.
+  std::vector<Eigen::Vector2d> seen_from;  ///< Positions of the vehicle [m], frame map.
+  std::vector<StoryStep> steps;            ///< Steps from the sensor on.
 };
 
-/// A story, or why there is none.
+/// A story, or the reason why there is none.
 struct Answer {
   std::optional<Story> story;
-  std::string error;  ///< One line; empty where there is a story.
+  std::string error;  ///< One line; empty if there is a story.
 };
 
 }  // namespace understory::story

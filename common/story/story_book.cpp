@@ -8,7 +8,7 @@
 namespace understory::story {
 namespace {
 
-/// What the landmarks may take: the rest beside what poses and moments may.
+/// Memory for landmarks: the rest beside poses and moments.
 std::size_t landmark_bytes(const Limits& limits) {
   const std::size_t fixed = LandmarkBook::fixed_bytes(limits) + PoseBook::fixed_bytes(limits);
   return limits.bytes - std::min(limits.bytes, fixed);

@@ -1,4 +1,4 @@
-// Why is this landmark there, why is this pose what it is: answered from the messages on the bus.
+// Explains the origin of a landmark or a pose from the messages on the bus.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,13 @@
 
 namespace understory::story {
 
-/// Remembers messages in bounded memory and tells what they say of one landmark or one pose.
+/// Stores messages in bounded memory and reports their content on one landmark or one pose.
 ///
-/// Pure: it has no clock; a receive time is a value like others. One thread. Text is made on
-/// asking. Each message costs O(what it names).
+/// Pure: it has no clock; a reception time is a value like others. One thread. Text is made on
+/// request. Each message costs O(its content).
 class StoryBook {
  public:
-  /// Empty.
+  /// An empty book.
   explicit StoryBook(const Limits& limits = {});
 
   /// Takes a message as it came, of any version; what is malformed is counted and passed over, and
@@ -26,7 +26,7 @@ class StoryBook {
   void take(std::string_view channel, std::span<const std::uint8_t> bytes,
             std::int64_t received_us);
 
-  /// Takes a value that somebody decoded already; sweeps and scans say which channel they are of.
+  /// Takes a decoded value; for sweeps and scans see the overloads with their channel.
   template <class Value>
   void take(const Value& value, std::int64_t received_us) {
     starts_with(value.utime);
@@ -44,18 +44,18 @@ class StoryBook {
     poses_.take(part, is_raw, received_us);
   }
 
-  /// What became of a landmark.
+  /// The story of a landmark.
   Answer landmark(model::LandmarkId id) const { return tell_landmark(landmarks_, id, start()); }
-  /// How a pose was made.
+  /// The story of a pose.
   Answer pose(const PoseQuestion& question) const { return tell_pose(poses_, question, start()); }
 
-  /// The first stamp that was taken: the origin of times in words; 0 before any.
+  /// The first stamp: origin of times in texts; 0 before the first one.
   model::Utime start() const { return start_.value_or(0); }
-  /// Messages of these channels that would not decode.
+  /// Messages of these channels that could not be decoded.
   std::uint64_t malformed() const { return malformed_; }
-  const LandmarkBook& landmarks() const { return landmarks_; }  ///< For those who count.
-  const PoseBook& poses() const { return poses_; }              ///< For those who count.
-  /// Held [bytes], with what the allocator adds. O(messages held).
+  const LandmarkBook& landmarks() const { return landmarks_; }  ///< Access for statistics.
+  const PoseBook& poses() const { return poses_; }              ///< Access for statistics.
+  /// Memory held [bytes], with the allocator's overhead. O(stored messages).
   std::size_t bytes() const { return landmarks_.bytes() + poses_.bytes(); }
 
  private:

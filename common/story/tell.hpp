@@ -1,4 +1,4 @@
-// Stories from the books.
+// Makes stories from the books.
 #pragma once
 
 #include "common/story/landmark_book.hpp"
@@ -7,27 +7,27 @@
 
 namespace understory::story {
 
-/// Which pose a question is about.
+/// Selects the pose of a question.
 struct PoseQuestion {
-  /// How it is chosen.
+  /// Criterion of the choice.
   enum class Choice : std::uint8_t {
-    kNearest,  ///< To `utime`.
+    kNearest,  ///< Nearest to `utime`.
     kLast,
-    kWorst,    ///< Largest sigma of the position, among poses that mean something.
-    kSlowest,  ///< Longest from the sensor; where times are not known there is none.
+    kWorst,    ///< Largest sigma of the position, among valid poses.
+    kSlowest,  ///< Longest time from the sensor; none where times are unknown.
   };
   Choice choice = Choice::kNearest;
   model::Utime utime = 0;
 };
 
-/// What became of a landmark, and of the one that it was merged into; `start` is the origin of
-/// times in words. O(its events); O(all landmarks) for an id that is not known.
+/// The story of a landmark, and of the one into which it was merged; `start` is the origin of times
+/// in texts. O(its events); O(all landmarks) for an unknown id.
 Answer tell_landmark(const LandmarkBook& book, model::LandmarkId id, model::Utime start);
 
-/// How a pose was made. O(messages held), `kSlowest` with a logarithm.
+/// The story of a pose. O(stored messages), for `kSlowest` with a logarithm.
 Answer tell_pose(const PoseBook& book, const PoseQuestion& question, model::Utime start);
 
-/// The messages from the sensor to a pose, in order; `ms` where it is known. O(messages held).
+/// The messages from the sensor to a pose, in order; with `ms` where known. O(stored messages).
 std::vector<StoryStep> steps_to(const PoseBook& book, const PoseRecord& pose);
 
 }  // namespace understory::story

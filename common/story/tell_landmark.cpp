@@ -9,7 +9,7 @@
 namespace understory::story {
 namespace {
 
-/// The words for one landmark.
+/// Makes the text on one landmark.
 class LandmarkTeller {
  public:
   LandmarkTeller(const LandmarkBook& book, const LandmarkRecord& record, model::Utime start)
@@ -31,13 +31,13 @@ class LandmarkTeller {
     add(story, "limits", dropped());
   }
 
-  /// In order of time; `prefix` is said before each.
+  /// Adds events in order of time, each with `prefix`.
   void events(Story& story, const std::string& prefix) const {
     std::vector<StoryEvent> all;
     std::vector<StoryEvent> later = looks();
     for (std::uint32_t i = 0; i < record_.events.size(); ++i) {
       const LandmarkEvent& one = record_.events[i];
-      // Of one stamp, what begins comes before what is seen, and that before what ends.
+      // At one stamp, begins come before looks, and looks before ends.
       const bool begins = one.kind == EventKind::kBorn || one.kind == EventKind::kTold;
       (begins ? all : later).push_back({stamp(one.moment), words(one)});
     }
@@ -242,7 +242,7 @@ class LandmarkTeller {
     return "";
   }
 
-  /// Stretches of keyframes that saw it, or that missed it, without others in between.
+  /// Runs of successive keyframes that saw it, or that missed it.
   std::vector<StoryEvent> looks() const {
     std::vector<StoryEvent> all;
     std::uint32_t begin = 0;
@@ -276,7 +276,7 @@ class LandmarkTeller {
   model::Utime start_;
 };
 
-/// Which ids there are, for somebody who asked for another one.
+/// The known ids, for a question about an unknown one.
 std::string known_ids(const LandmarkBook& book, model::LandmarkId wanted) {
   struct Ids {
     std::uint64_t count = 0;

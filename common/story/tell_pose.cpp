@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-/// Distance of two stamps that may be anything.
+/// Difference of two arbitrary stamps.
 double apart_us(model::Utime a, model::Utime b) {
   return std::abs(static_cast<double>(a) - static_cast<double>(b));
 }
@@ -72,7 +72,7 @@ std::string pose_words(const geometry::SE2& pose) {
                      pose.theta() * kDegrees);
 }
 
-/// In the vehicle's frame, as the covariance is.
+/// In the vehicle's frame, like the covariance.
 std::string pose_sigma_words(const Eigen::Matrix3d& covariance) {
   const Eigen::Vector3d sigmas = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   return fmt::format("{:.3f} m ahead, {:.3f} m aside, {:.3f} deg; largest {:.3f} m", sigmas.x(),
@@ -148,7 +148,7 @@ void pose_facts(Story& story, const PoseBook& book, const PoseRecord& record,
   add("limits", dropped_words("poses", book.poses().dropped()));
 }
 
-/// The verdicts on the latest keyframes: why it coasts, or is lost.
+/// The verdicts on the latest keyframes: the reason why it coasts or is lost.
 void verdicts(Story& story, const PoseBook& book, const PoseRecord& record) {
   constexpr std::size_t kVerdicts = 8;
   std::vector<StoryEvent> latest;
@@ -163,7 +163,7 @@ void verdicts(Story& story, const PoseBook& book, const PoseRecord& record) {
   story.events.assign(latest.rbegin(), latest.rend());
 }
 
-/// Of the poses up to this one.
+/// Adds the sigmas of the poses up to this one.
 void sigma_series(Story& story, const PoseBook& book, const PoseRecord& record) {
   constexpr std::size_t kPoses = 100;
   StorySeries series{"largest sigma of the position", "m", {}, {}};

@@ -5,7 +5,7 @@
 namespace understory::terminal {
 namespace {
 
-// A signal handler reaches nothing but a variable of the whole program.
+// A signal handler can access only a global variable.
 std::atomic<bool> interrupted{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 

@@ -1,4 +1,4 @@
-// Ctrl-C and SIGTERM as an ordinary failure, so that destructors tidy up what is half written.
+// Ctrl-C and SIGTERM as an ordinary failure, so that destructors remove incomplete files.
 #pragma once
 
 #include <atomic>
@@ -6,17 +6,17 @@
 
 namespace understory::terminal {
 
-/// Somebody ended the call before its work was done.
+/// The user ended the call before its work was done.
 class Interrupted : public std::runtime_error {
  public:
   /// what() is "interrupted".
   Interrupted() : std::runtime_error("interrupted") {}
 };
 
-/// From now on SIGINT and SIGTERM only set the flag that is returned; a second one ends the process
-/// at once. May be called again.
+/// From now on SIGINT and SIGTERM only set the returned flag; a second one ends the process at
+/// once. May be called again.
 const std::atomic<bool>& catch_interrupts();
-/// Throws Interrupted once the flag is set; to be called in every long loop.
+/// Throws Interrupted if the flag is set; call it in every long loop.
 void throw_if_interrupted();
 
 }  // namespace understory::terminal

@@ -7,7 +7,7 @@
 namespace understory::terminal {
 namespace {
 
-/// A character and how many bytes it takes; 0 bytes where none begins.
+/// A character and its number of bytes; 0 bytes where none begins.
 struct Character {
   char32_t code = 0;
   std::size_t bytes = 0;

@@ -1,4 +1,4 @@
-// Text of others on a terminal.
+// Safe output of foreign text on a terminal.
 #pragma once
 
 #include <string>
@@ -6,11 +6,12 @@
 
 namespace understory::terminal {
 
-/// `text` with every byte that could steer a terminal, or is no UTF-8, written as `\xNN`: control
-/// characters (also those beyond ASCII), marks that turn the direction of writing, and damaged or
-/// overlong sequences. Everything else stays as it is; the result is one line of valid UTF-8.
+/// `text` with every byte that could control a terminal, or is not UTF-8, written as `\xNN`:
+/// control characters (also those beyond ASCII), marks that turn the direction of writing, and
+/// damaged or overlong sequences. Everything else stays as it is; the result is one line of valid
+/// UTF-8.
 std::string printable(std::string_view text);
-/// The same, line feeds left as they are: for messages of several lines.
+/// The same, with unchanged line feeds: for messages of several lines.
 std::string printable_lines(std::string_view text);
 
 }  // namespace understory::terminal

@@ -12,7 +12,7 @@ namespace understory::terminal {
 namespace {
 
 constexpr int kWidth = 30;
-/// Calls that end sooner show nothing.
+/// Shorter calls show nothing.
 constexpr std::chrono::milliseconds kQuiet{500};
 constexpr std::chrono::milliseconds kRedraw{100};
 constexpr std::chrono::seconds kLine{5};

@@ -1,4 +1,4 @@
-// How far a long call is and when it will end, on stderr.
+// Progress and expected end of a long call, on stderr.
 #pragma once
 
 #include <chrono>
@@ -7,14 +7,14 @@
 
 namespace understory::terminal {
 
-/// A bar that is redrawn in place where stderr is a terminal; it disappears at the end.
+/// A progress bar, redrawn in place if stderr is a terminal; it disappears at the end.
 class Progress {
  public:
-  /// What to do where stderr is no terminal: nothing, one line for every tenth of the work, or one
-  /// line every five seconds.
+  /// Output if stderr is no terminal: nothing, one line for every tenth of the work, or one line
+  /// every five seconds.
   enum class Without { kSilence, kTenths, kSeconds };
   using Clock = std::chrono::steady_clock;
-  /// Where it draws; the file stays the caller's.
+  /// Output of the bar; the caller owns the file.
   struct Output {
     std::FILE* file = stderr;
     bool is_terminal = false;

@@ -68,7 +68,7 @@ void HttpSession::on_read(const beast::error_code& error) {
     return;
   }
   if (error == beast::error::timeout) {
-    // A browser keeps idle connections: only half a request is slow.
+    // A browser keeps idle connections: only an incomplete request counts as slow.
     if (parser_->got_some()) shared_->count(&ServerCounts::too_slow);
   } else if (error == http::error::header_limit || error == http::error::body_limit) {
     shared_->count(&ServerCounts::too_large);

@@ -1,4 +1,4 @@
-// One HTTP connection, in the thread of the sockets, until it ends or becomes a WebSocket.
+// One HTTP connection in the sockets' thread, until it ends or becomes a WebSocket.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -15,27 +15,27 @@
 
 namespace understory::web {
 
-/// Keeps itself alive while an operation is under way.
+/// Keeps itself alive during an operation.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
-  /// Takes over a connection that asks for a WebSocket and may have it.
+  /// Takes over a connection with an accepted request for a WebSocket.
   using Upgrade =
       std::function<void(boost::beast::tcp_stream stream, const SocketSession::Request& request,
                          const SocketPath& path, std::string subprotocol)>;
 
-  /// `options` must outlive it. `ended` is called once, also where the connection was handed on.
+  /// `options` must outlive it. `ended` is called once, also if the connection was handed over.
   HttpSession(boost::asio::ip::tcp::socket socket, const ServerOptions& options,
               std::shared_ptr<SharedState> shared, Upgrade upgrade, std::function<void()> ended);
-  /// Tells that it is over.
+  /// Calls `ended`.
   ~HttpSession();
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
 
-  /// Waits for a request.
+  /// Starts to read a request.
   void read();
-  /// Since when it waits for a request that is not whole yet; none while one is answered.
+  /// Start of the wait for a complete request; none while one is answered.
   std::optional<std::chrono::steady_clock::time_point> waiting_since() const { return waiting_; }
-  /// Ends it: its place is needed.
+  /// Ends it, because its place is needed.
   void give_way();
 
  private:

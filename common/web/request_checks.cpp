@@ -13,7 +13,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-/// Without the port; brackets of IPv6 are taken off.
+/// The host without port and without the brackets of IPv6.
 std::string host_name(std::string_view host) {
   if (host.starts_with('[')) {
     const auto end = host.find(']');

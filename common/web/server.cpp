@@ -86,7 +86,7 @@ class Server::Impl {
     port_ = acceptor_.local_endpoint().port();
   }
 
-  /// Signals stay with the other threads.
+  /// Starts the thread; signals go to the other threads.
   void start_thread() {
     sigset_t all;
     sigset_t before;
@@ -100,7 +100,7 @@ class Server::Impl {
     acceptor_.async_accept([this](const boost::system::error_code& error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
       if (error) {
-        // No file descriptor left: not at once again.
+        // No file descriptor is left: wait before the next try.
         pause_.expires_after(std::chrono::milliseconds(200));
         pause_.async_wait([this](const boost::system::error_code& /*error*/) { accept(); });
         return;
@@ -130,7 +130,7 @@ class Server::Impl {
     session->read();
   }
 
-  /// Half a request, dripped in slowly, costs its sender nothing: it must not keep others out.
+  /// A slow, incomplete request costs its sender nothing, so it must not exclude others.
   bool make_room() {
     std::shared_ptr<HttpSession> slowest;
     for (const auto& one : sessions_) {
@@ -157,11 +157,11 @@ class Server::Impl {
     session->start(request);
   }
 
-  // Sessions count down and erase themselves when the context destroys them: what they touch comes
-  // before it.
+  // Sessions change counts and erase themselves when the context destroys them, so members that
+  // they use are declared before it.
   ServerOptions options_;
   std::shared_ptr<SharedState> shared_ = std::make_shared<SharedState>();
-  std::list<std::weak_ptr<HttpSession>> sessions_;  ///< Not yet WebSockets.
+  std::list<std::weak_ptr<HttpSession>> sessions_;  ///< Connections that are not WebSockets yet.
   ClientId last_client_ = 0;
   std::unordered_map<ClientId, std::shared_ptr<SocketSession>> sockets_;
   std::uint16_t port_ = 0;

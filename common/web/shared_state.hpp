@@ -1,4 +1,4 @@
-// What the thread of the sockets and the owner of a server share.
+// Data shared by the sockets' thread and the owner of a server.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace understory::web {
 
-/// Events, documents and counts, each access locked for as long as a copy takes.
+/// Events, documents and counts, each access is locked for the time of a copy.
 class SharedState {
  public:
   SharedState();
@@ -24,17 +24,17 @@ class SharedState {
   int file_descriptor() const { return event_file_; }
   /// Adds an event and makes the file readable.
   void push(Event event);
-  /// Takes all events; the file is readable no more.
+  /// Takes all events; the file is then no longer readable.
   std::vector<Event> take();
 
-  /// What GET of `path` gives.
+  /// Sets the response to GET of `path`.
   void set_document(const std::string& path, Document document);
-  /// Null where there is none.
+  /// The document of a path; null = none.
   std::shared_ptr<const Document> document(const std::string& path) const;
 
   /// Adds 1 to a count.
   void count(std::uint64_t ServerCounts::*which);
-  /// A copy.
+  /// A copy of the counts.
   ServerCounts counts() const;
 
  private:

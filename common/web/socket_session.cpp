@@ -133,7 +133,7 @@ void SocketSession::close(const std::string& reason) {
   if (!is_open_) {
     end();
   } else {
-    write();  // Behind the message that is being written, if there is one.
+    write();  // After the message being written, if there is one.
   }
 }
 

@@ -1,4 +1,4 @@
-// One WebSocket, in the thread of the sockets.
+// One WebSocket, in the sockets' thread.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -14,12 +14,12 @@
 
 namespace understory::web {
 
-/// Keeps itself alive while an operation is under way.
+/// Keeps itself alive during an operation.
 class SocketSession : public std::enable_shared_from_this<SocketSession> {
  public:
-  /// The request that asks for the WebSocket.
+  /// The request for the WebSocket.
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
-  /// What a session needs of its server.
+  /// The server's data for a session.
   struct Place {
     ClientId id = 0;
     SocketPath path;
@@ -27,19 +27,19 @@ class SocketSession : public std::enable_shared_from_this<SocketSession> {
     std::size_t most_unsent_bytes = 0;
     int timeout_s = 0;
     std::shared_ptr<SharedState> shared;
-    std::function<void(ClientId)> forget;  ///< Called once, when it is over.
+    std::function<void(ClientId)> forget;  ///< Called once at its end.
   };
 
   /// Takes over a connection.
   SocketSession(boost::beast::tcp_stream stream, Place place);
 
-  /// Answers the request; from then on messages come.
+  /// Answers the request; messages arrive from then on.
   void start(const Request& request);
   /// Queues a message.
   void send(std::shared_ptr<const std::string> message, bool is_binary);
-  /// Says goodbye.
+  /// Closes the WebSocket with a reason.
   void close(const std::string& reason);
-  /// The owner has taken the messages that waited.
+  /// Call it when the owner has taken the waiting messages.
   void resume();
 
  private:
@@ -61,7 +61,7 @@ class SocketSession : public std::enable_shared_from_this<SocketSession> {
   std::deque<Outgoing> outbox_;
   std::string goodbye_;
   std::size_t unsent_bytes_ = 0;
-  std::size_t waiting_messages_ = 0;  ///< With the owner.
+  std::size_t waiting_messages_ = 0;  ///< Messages waiting for the owner.
   bool is_reading_ = false;
   bool is_writing_ = false;
   bool is_open_ = false;
