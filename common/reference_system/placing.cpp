@@ -13,7 +13,7 @@ namespace {
 constexpr double kLeastReach_m = 1.0;
 constexpr int kMostFrames = 10;
 constexpr int kWeightRounds = 30;
-/// When a frame is that of the map.
+/// Largest difference of equal frames.
 constexpr double kSame_m = 2e-5;
 constexpr double kSame_rad = 1e-9;
 
@@ -56,7 +56,7 @@ Eigen::Vector2d middle_of(const Places& places) {
   return sum / static_cast<double>(places.size());
 }
 
-/// How far points lie from their middle, all together.
+/// Root of the sum of squared distances of the points from their mean.
 double spread_m(const Places& places) {
   const Eigen::Vector2d middle = middle_of(places);
   double squares = 0.0;
@@ -91,8 +91,7 @@ Placing place_map(const std::string& system, std::span<const CommonPoint> points
     throw ReferenceError("the points lie within 1 m of each other: they show no direction");
 
   placing.reference = frame_at(system, points.front().world);
-  // The north of one place is not that of the next: the frame is looked for where the map has its
-  // origin.
+  // North differs from place to place: iterate until the frame is at the map's origin.
   for (int i = 0; i < kMostFrames; ++i) {
     const Transformation into = into_frame(system, placing.reference);
     const Places places = placed_in(into, points);

@@ -34,7 +34,7 @@ const char* kind_text(PJ_TYPE type) {
   }
 }
 
-/// The horizontal one of what a person named.
+/// The horizontal part of the system that the user named.
 ProjHandle horizontal_part(PJ_CONTEXT* context, ProjHandle found, const std::string& text) {
   PJ_TYPE type = proj_get_type(found.get());
   if (type == PJ_TYPE_COMPOUND_CRS) {

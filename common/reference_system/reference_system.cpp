@@ -15,9 +15,9 @@ constexpr double kPerDegree = std::numbers::pi / 180.0;
 constexpr const char* kWgs84Code = "EPSG:4326";
 /// Digits of the origin's degrees: 0.01 mm.
 constexpr double kOriginSteps = 1e10;
-/// Azimuth of the oblique projection's line. Any that is none of the axes would do.
+/// Azimuth of the oblique projection's line. Any angle that is not along an axis is possible.
 constexpr double kAzimuthDeg = 45.0;
-/// Around the place that chooses a transformation [deg].
+/// Half size of the area around the place that selects a transformation [deg].
 constexpr double kAreaDeg = 0.01;
 
 struct AreaRelease {
@@ -45,7 +45,7 @@ double unit_of_axes(PJ_CONTEXT* context, PJ* system) {
 
 bool is_geographic_type(PJ* system) { return proj_get_type(system) == PJ_TYPE_GEOGRAPHIC_2D_CRS; }
 
-/// The meridian from which a system's longitudes count [deg east of Greenwich].
+/// The prime meridian of a system [deg east of Greenwich].
 double prime_meridian_deg(PJ_CONTEXT* context, PJ* geographic) {
   const ProjHandle meridian(proj_get_prime_meridian(context, geographic));
   double longitude = 0.0;
@@ -59,11 +59,11 @@ double rounded_deg(double degrees) { return std::round(degrees * kOriginSteps) /
 
 struct FramePlace {
   double latitude_deg = 0.0;
-  double longitude_deg = 0.0;  ///< From the datum's own meridian.
+  double longitude_deg = 0.0;  ///< Longitude from the datum's own meridian.
   double rotation_rad = 0.0;
 };
 
-/// Its projection, as well-known text has it; angles are in the units of the datum's.
+/// Its projection as well-known text; angles are in the datum's units.
 std::string projection_text(const FramePlace& place, double degrees_per_unit) {
   const auto angle = [&](double degrees) { return degrees / degrees_per_unit; };
   if (place.rotation_rad == 0.0)
@@ -92,7 +92,7 @@ std::string definition_of_frame(PJ_CONTEXT* context, PJ* base, const FramePlace&
       datum, projection_text(place, degrees_per_unit));
 }
 
-/// Of an area; west is more than east where it lies across the date line.
+/// Bounds of an area; west is above east if it crosses the date line.
 struct Bounds {
   double west_deg = 0.0;
   double south_deg = 0.0;
@@ -100,8 +100,8 @@ struct Bounds {
   double north_deg = 0.0;
 };
 
-/// From longitude and latitude to the bounds on a sphere, along a parallel and a meridian; 0 within
-/// them.
+/// Distance from longitude and latitude to the bounds on a sphere, along a parallel and a meridian;
+/// 0 within them.
 double distance_to(const Bounds& bounds, const Eigen::Vector2d& place_deg) {
   constexpr double kEarthRadius_m = 6.371e6;
   const auto turned = [](double degrees) { return degrees - 360.0 * std::floor(degrees / 360.0); };
@@ -117,7 +117,7 @@ double distance_to(const Bounds& bounds, const Eigen::Vector2d& place_deg) {
          std::hypot(above_deg, beside_deg * std::cos(place_deg.y() * kPerDegree));
 }
 
-/// Where the origin of a frame lies; good enough to choose a transformation by.
+/// Approximate location of a frame's origin, sufficient to select a transformation.
 Geographic place_of(const model::MapReference& frame) {
   return {frame.latitude_deg, frame.longitude_deg};
 }
@@ -181,7 +181,7 @@ model::MapReference frame_at(const std::string& system, const Eigen::Vector2d& o
   model::MapReference frame;
   frame.system = code_of(found.get());
   frame.latitude_deg = rounded_deg(at_deg.y());
-  // A table that lies across the date line may count on behind 180 degrees.
+  // A table across the date line may continue beyond 180 degrees.
   const double longitude_deg = rounded_deg(std::remainder(at_deg.x(), 360.0));
   frame.longitude_deg = longitude_deg + prime_meridian_deg(context.get(), base.get());
   frame.rotation_rad = rotation_rad;

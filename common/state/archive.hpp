@@ -1,5 +1,5 @@
-// A stage's state as bytes. Writing and reading go through the same list of members, so that no
-// member is named twice.
+// A stage's state as bytes. Writing and reading use the same list of members, so that no member is
+// listed twice.
 //
 // A type lists its members once, as a static member function or as a free function beside the type:
 //
@@ -9,7 +9,7 @@
 //     if constexpr (Archive::kReads) self.rebuild_index();
 //   }
 //
-// save() and load() put the format's name and version in front of them.
+// save() and load() add the format's name and version at the front.
 #pragma once
 
 #include <Eigen/Core>
@@ -36,20 +36,20 @@ namespace understory::state {
 
 static_assert(std::endian::native == std::endian::little, "states are stored in little endian");
 
-/// Which list of members the bytes hold. `version` grows with every change of that list.
+/// Identifies the list of members in the bytes. `version` increases with every change of that list.
 struct Format {
   std::string_view name;
   std::uint32_t version = 1;
 };
 
-/// What is stored as its bytes.
+/// A type stored as its bytes.
 template <class T>
 concept Number = std::is_arithmetic_v<T> || std::is_enum_v<T>;
-/// An Eigen matrix whose size its type gives.
+/// An Eigen matrix of fixed size.
 template <class T>
 concept FixedMatrix =
     std::derived_from<T, Eigen::PlainObjectBase<T>> && T::SizeAtCompileTime != Eigen::Dynamic;
-/// An Eigen matrix that is stored behind its numbers of rows and columns.
+/// An Eigen matrix of dynamic size, stored after its numbers of rows and columns.
 template <class T>
 concept DynamicMatrix =
     std::derived_from<T, Eigen::PlainObjectBase<T>> && T::SizeAtCompileTime == Eigen::Dynamic;
@@ -92,14 +92,14 @@ class Writer {
  public:
   static constexpr bool kReads = false;
 
-  /// Appends the values, one behind the other.
+  /// Appends the values in sequence.
   template <class... Values>
   void operator()(const Values&... values) {
     (put(values), ...);
   }
-  /// What was written so far.
+  /// Bytes written so far.
   const std::string& bytes() const { return bytes_; }
-  /// What was written, moved out.
+  /// Moves out the written bytes.
   std::string take() { return std::move(bytes_); }
 
  private:
@@ -153,7 +153,7 @@ class Writer {
   std::string bytes_;
 };
 
-/// Takes values from what a Writer gave. Throws std::invalid_argument where bytes are missing.
+/// Reads values from the bytes of a Writer. Throws std::invalid_argument where bytes are missing.
 class Reader {
  public:
   static constexpr bool kReads = true;
@@ -165,7 +165,7 @@ class Reader {
   void operator()(Values&... values) {
     (get(values), ...);
   }
-  /// True when nothing is left to read.
+  /// True when all bytes are read.
   bool is_at_end() const { return bytes_.empty(); }
 
  private:
@@ -184,7 +184,7 @@ class Reader {
       std::uint64_t cols = 0;
       get(rows);
       get(cols);
-      // One side of an empty matrix may be longer than what is left.
+      // One side of an empty matrix may exceed the remaining bytes.
       if (std::max(rows, cols) > kLongestSide) fail();
       if (rows != 0 && cols > bytes_.size() / sizeof(typename T::Scalar) / rows) fail();
 
@@ -245,7 +245,8 @@ class Reader {
       }
     }
   }
-  /// A number of elements of at least so many bytes: a damaged one asks for no memory.
+  /// Reads a number of elements of at least `least_bytes` each, so that a damaged number requests
+  /// no memory.
   std::uint64_t count(std::size_t least_bytes) {
     std::uint64_t size = 0;
     get(size);
@@ -264,7 +265,7 @@ class Reader {
   std::string_view bytes_;
 };
 
-/// The bytes of the values, behind the format's name and version.
+/// The bytes of the values, after the format's name and version.
 template <class... Values>
 std::string save(const Format& format, const Values&... values) {
   Writer out;
@@ -272,8 +273,8 @@ std::string save(const Format& format, const Values&... values) {
   return out.take();
 }
 
-/// Reads what save() of the same format gave. Throws std::invalid_argument where the bytes are of
-/// another format or version, cut off or too long; the values are then in any state.
+/// Reads the result of save() of the same format. Throws std::invalid_argument where the bytes have
+/// another format or version, are cut off or too long; the values are then undefined.
 template <class... Values>
 void load(std::string_view bytes, const Format& format, Values&... values) {
   Reader in(bytes);

@@ -14,7 +14,7 @@ constexpr double kRounding = 1e-6;         // relative to the geometric mean of 
 constexpr double kFarthestM = 1e7;         // no local frame is larger than a country
 constexpr double kLargestVariance = 1e14;  // its square
 
-/// Short whatever the value: std::to_string writes out all of 1e300's digits.
+/// Short for any value: std::to_string would write all digits of 1e300.
 std::string number(double value) {
   std::array<char, 32> text{};
   const auto end =
@@ -39,7 +39,7 @@ std::optional<Eigen::Matrix<double, N, N>> correlations(const Eigen::Matrix<doub
   return result;
 }
 
-/// Why `matrix` cannot be a covariance.
+/// The fault of `matrix` as a covariance.
 template <int N>
 std::optional<Refusal> covariance_refusal(const Eigen::Matrix<double, N, N>& matrix) {
   for (int i = 0; i < N; ++i) {

@@ -1,4 +1,4 @@
-// The checks that conversions share; the first one that fails is kept.
+// Common checks of conversions; the first failure is stored.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,29 +13,30 @@
 
 namespace understory::wire {
 
-/// A matrix as the wire types hold it: double name[N][N], row by row.
+/// A matrix in the form of the wire types: double name[N][N], row by row.
 template <int N>
 using SquareArray = double[N][N];
 
-/// Collects what is wrong with one message. Fields may be checked in any order; what comes after
-/// the first failure is not looked at.
+/// Stores the fault of one message. Fields may be checked in any order; checks after the first
+/// failure are skipped.
 class Checks {
  public:
-  /// Names where the following fields are, e.g. detections[3]; empty = the message itself.
+  /// Sets the place of the following fields, e.g. detections[3]; empty = the message itself.
   void in(std::string_view array, std::size_t index) {
     array_ = array;
     index_ = index;
   }
-  /// The following fields are of the message itself.
+  /// The following fields belong to the message itself.
   void in_message() { array_ = {}; }
 
   /// Refuses a value outside lowest .. highest (both included) as kOutOfRange; NaN fails.
   void range(std::string_view field, double value, double lowest, double highest);
-  /// Refuses as kInconsistent where a relation between fields does not hold; `what` names it.
+  /// Refuses as kInconsistent where a relation between fields does not hold; `what` describes it.
   void consistent(bool holds, std::string_view what);
   /// Refuses a position beyond 10,000 km or a heading outside -pi .. pi.
   void pose(std::string_view field, const pose2_t& pose);
-  /// Symmetric within rounding and positive semidefinite; gives the exactly symmetric one.
+  /// Refuses a covariance that is not symmetric within rounding and positive semidefinite; returns
+  /// the exactly symmetric one.
   template <int N>
   Eigen::Matrix<double, N, N> covariance(std::string_view field, const SquareArray<N>& rows) {
     const Eigen::Matrix<double, N, N> matrix =
@@ -65,7 +66,7 @@ class Checks {
 };
 
 /// Whether a covariance (3 x 3, or 2 x 2 padded with zeros) is positive semidefinite within
-/// rounding, whatever the scales of its coordinates.
+/// rounding, for any scales of its coordinates.
 bool is_positive_semidefinite(const Eigen::Matrix3d& symmetric);
 /// The same for 5 x 5.
 bool is_positive_semidefinite_5(const Eigen::Matrix<double, 5, 5>& symmetric);

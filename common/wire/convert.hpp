@@ -1,7 +1,7 @@
-// Wire types <-> the values that stages exchange.
+// Converts between wire types and the values that stages exchange.
 //
-// `from_wire` takes a decoded message and checks what a layout cannot: ranges, kinds, covariances
-// symmetric and positive semidefinite, fields that agree. `to_wire` cannot fail.
+// `from_wire` takes a decoded message and checks values beyond the layout: ranges, kinds,
+// covariances symmetric and positive semidefinite, consistent fields. `to_wire` cannot fail.
 #pragma once
 
 #include <type_traits>
@@ -74,43 +74,43 @@ Result<model::Odometry> from_wire(const odometry2_t& wire);
 Result<model::Keyframe> from_wire(const keyframe2_t& wire);
 /// A keyframe of logs written before keyframe2_t: without detections.
 Result<model::Keyframe> from_wire(const keyframe_t& wire);
-/// How far the sensor saw.
+/// Free ranges around the sensor.
 Result<model::ViewRanges> from_wire(const view_ranges_t& wire);
-/// Points that tell a place.
+/// Points for place recognition.
 Result<model::PlaceScan> from_wire(const place_scan_t& wire);
-/// What a mapper did with one keyframe.
+/// A mapper's update for one keyframe.
 Result<model::MapUpdate> from_wire(const slam_update3_t& wire);
-/// The same of logs written before slam_update3_t: nothing is known of lines of sight.
+/// The same from logs written before slam_update3_t: without lines of sight.
 Result<model::MapUpdate> from_wire(const slam_update2_t& wire);
-/// The same of logs written before slam_update2_t: of map 1, without scans and detections.
+/// The same from logs written before slam_update2_t: map 1, without scans and detections.
 Result<model::MapUpdate> from_wire(const slam_update_t& wire);
 /// A mapper's pose at one scan.
 Result<model::SlamPose> from_wire(const slam_pose2_t& wire);
-/// The same of logs written before slam_pose2_t: in map 1.
+/// The same from logs written before slam_pose2_t: map 1.
 Result<model::SlamPose> from_wire(const slam_pose_t& wire);
 /// A whole map.
 Result<model::WholeMap> from_wire(const map_t& wire);
 /// A change of a map.
 Result<model::MapDelta> from_wire(const map_delta_t& wire);
-/// A part of a map; refused where the hash is not the payload's.
+/// A part of a map; refused where the hash does not match the payload.
 Result<model::Submap> from_wire(const submap_t& wire);
-/// That a submap is on the disk.
+/// Confirmation that a submap is on disk.
 Result<model::SubmapStored> from_wire(const submap_stored_t& wire);
-/// A question for submaps.
+/// A request for submaps.
 Result<model::SubmapQuery> from_wire(const submap_query_t& wire);
-/// Where the submaps are.
+/// Poses of the submaps.
 Result<model::MapCorrection> from_wire(const map_correction_t& wire);
-/// A loop closure, or that one is taken back.
+/// A loop closure, or the revocation of one.
 Result<model::LoopClosure> from_wire(const loop_closure2_t& wire);
-/// The same of logs written before loop_closure2_t.
+/// The same from logs written before loop_closure2_t.
 Result<model::LoopClosure> from_wire(const loop_closure_t& wire);
-/// What became of a loop closure.
+/// Result of a loop closure.
 Result<model::LoopResult> from_wire(const loop_result_t& wire);
-/// Whether landmarks are still there.
+/// Existence of landmarks.
 Result<model::Existence> from_wire(const existence_t& wire);
-/// What the existence tracker goes on with; refused where the hash is not that of its bytes.
+/// The existence tracker's saved state; refused where the hash does not match the bytes.
 Result<model::ExistenceState> from_wire(const existence_state_t& wire);
-/// A scan of one plane; where the laser sits and the intensities are left out.
+/// A planar scan, without the laser's pose and the intensities.
 Result<model::PlanarScan> from_wire(const lidar_scan_t& wire);
 /// A reading of wheel encoder and steering sensor.
 Result<model::WheelSample> from_wire(const wheels_t& wire);
@@ -128,13 +128,13 @@ Result<model::EkfPose> from_wire(const ekf_pose_t& wire);
 Result<model::EkfMap> from_wire(const ekf_map_t& wire);
 /// The filter's estimate of the level.
 Result<model::EkfLevel> from_wire(const ekf_level_t& wire);
-/// REST_LEVEL: the rest ends after it began and not after `utime`.
-/// Older logs: the change is as uncertain as the error.
+/// REST_LEVEL: the stationary interval must end after its begin and not after `utime`. In older
+/// logs the covariance of the change equals that of the error.
 Result<model::RestLevel> from_wire(const rest_level_t& wire);
 Result<model::RestLevel> from_wire(const rest_level2_t& wire);
 /// The filter's correction of velocity and biases.
 Result<model::VelocityCorrection> from_wire(const velocity_correction_t& wire);
-/// A satellite fix; refused where the receiver has none.
+/// A satellite fix; refused where the receiver has no fix.
 Result<model::GnssFix> from_wire(const gnss_t& wire);
 
 /// A scan of detected landmarks.
@@ -143,11 +143,11 @@ landmarks_t to_wire(const model::LandmarkScan& scan);
 odometry2_t to_wire(const model::Odometry& odometry);
 /// A keyframe.
 keyframe2_t to_wire(const model::Keyframe& keyframe);
-/// What a mapper did with one keyframe; `seq` is the keyframe's.
+/// A mapper's update for one keyframe, with the keyframe's `seq`.
 slam_update3_t to_wire(const model::MapUpdate& update);
-/// How far the sensor saw.
+/// Free ranges around the sensor.
 view_ranges_t to_wire(const model::ViewRanges& ranges);
-/// Points that tell a place.
+/// Points for place recognition.
 place_scan_t to_wire(const model::PlaceScan& scan);
 /// A mapper's pose.
 slam_pose2_t to_wire(const model::SlamPose& pose);
@@ -157,21 +157,21 @@ map_t to_wire(const model::WholeMap& map);
 map_delta_t to_wire(const model::MapDelta& delta);
 /// A part of a map.
 submap_t to_wire(const model::Submap& submap);
-/// That a submap is on the disk.
+/// Confirmation that a submap is on disk.
 submap_stored_t to_wire(const model::SubmapStored& stored);
-/// A question for submaps.
+/// A request for submaps.
 submap_query_t to_wire(const model::SubmapQuery& query);
-/// Where the submaps are.
+/// Poses of the submaps.
 map_correction_t to_wire(const model::MapCorrection& correction);
 /// A loop closure.
 loop_closure2_t to_wire(const model::LoopClosure& closure);
-/// What became of a loop closure.
+/// Result of a loop closure.
 loop_result_t to_wire(const model::LoopResult& result);
-/// Whether landmarks are still there.
+/// Existence of landmarks.
 existence_t to_wire(const model::Existence& existence);
-/// What the existence tracker goes on with.
+/// The existence tracker's saved state.
 existence_state_t to_wire(const model::ExistenceState& state);
-/// A scan of one plane.
+/// A planar scan.
 lidar_scan_t to_wire(const model::PlanarScan& scan);
 /// A reading of wheel encoder and steering sensor.
 wheels_t to_wire(const model::WheelSample& sample);
@@ -198,11 +198,10 @@ velocity_correction_t to_wire(const model::VelocityCorrection& correction);
 
 /// A pose [m, rad].
 pose2_t to_wire(const geometry::SE2& pose);
-/// A pose [m, rad], unchecked: Checks::pose() looks at it before.
+/// A pose [m, rad], unchecked: call Checks::pose() before.
 geometry::SE2 from_wire(const pose2_t& pose);
 
-/// The wire type of a value that stages exchange is what to_wire() makes of it; a wire type is its
-/// own.
+/// The wire type of a value is the result type of to_wire(); a wire type maps to itself.
 template <class T>
 struct WireOf {
   using type = T;  ///< The wire type.
@@ -214,7 +213,7 @@ struct WireOf<T> {
   using type = decltype(to_wire(std::declval<const T&>()));  ///< The wire type.
 };
 
-/// Bytes to a value (or a wire type), with every check there is.
+/// Converts bytes to a value (or a wire type), with all checks.
 template <class T>
 Result<T> decode_message(std::span<const std::uint8_t> bytes) {
   using Wire = typename WireOf<T>::type;
@@ -227,7 +226,7 @@ Result<T> decode_message(std::span<const std::uint8_t> bytes) {
   }
 }
 
-/// Of a value whose wire type had other versions, which older logs have; the newest first.
+/// The same for a value with older versions of its wire type in older logs; the newest first.
 template <class T, class... Old>
 Result<T> decode_either(std::span<const std::uint8_t> bytes) {
   const auto wire = decode_bytes<typename WireOf<T>::type>(bytes);
@@ -280,7 +279,7 @@ inline Result<model::LoopClosure> decode_message<model::LoopClosure>(
   return decode_either<model::LoopClosure, loop_closure_t>(bytes);
 }
 
-/// A value (or a wire type) to bytes.
+/// Converts a value (or a wire type) to bytes.
 template <class T>
 Bytes encode_message(const T& value) {
   if constexpr (std::is_same_v<T, typename WireOf<T>::type>) {

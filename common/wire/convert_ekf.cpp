@@ -141,7 +141,7 @@ ekf_level_t to_wire(const model::EkfLevel& level) {
 
 namespace {
 
-/// What every version of REST_LEVEL has.
+/// Common part of all versions of REST_LEVEL.
 template <class Wire>
 model::RestLevel rest_level(const Wire& wire, Checks& checks) {
   checks.consistent(wire.rest_from_utime >= 0 && wire.rest_from_utime <= wire.rest_utime &&

@@ -1,4 +1,4 @@
-// Landmark ids and merges, which maps and updates both have.
+// Landmark ids and merges of maps and updates.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ inline std::vector<model::LandmarkId> ids(std::string_view field,
 /// Pairs old, new.
 using Merges = std::vector<std::pair<model::LandmarkId, model::LandmarkId>>;
 
-/// Those of a message.
+/// Merges of a message.
 inline Merges merges(const std::vector<merge_t>& wire, Checks& checks) {
   Merges result;
   result.reserve(wire.size());
@@ -56,7 +56,7 @@ inline std::vector<merge_t> to_wire(const Merges& merges) {
   return wire;
 }
 
-/// The counts of lists that both types have.
+/// The counts of lists in both types.
 template <class Wire>
 void copy_counts(Wire& wire) {
   wire.num_added = static_cast<std::int32_t>(wire.added.size());

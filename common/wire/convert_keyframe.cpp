@@ -29,7 +29,7 @@ model::KeyframeLandmark landmark(const keyframe_landmark_t& wire, Checks& checks
   return result;
 }
 
-/// Members are in order of time and the keyframe carries the first one's stamp.
+/// Members must be in order of time, and the keyframe must have the first one's stamp.
 template <class Wire>
 void check_order(const Wire& wire, Checks& checks) {
   checks.in_message();
@@ -42,7 +42,7 @@ void check_order(const Wire& wire, Checks& checks) {
   }
 }
 
-/// What both versions have.
+/// Common part of both versions.
 template <class Wire>
 model::Keyframe keyframe_of(const Wire& wire, Checks& checks) {
   check_order(wire, checks);
@@ -69,7 +69,7 @@ model::Keyframe keyframe_of(const Wire& wire, Checks& checks) {
   return keyframe;
 }
 
-/// Each of a member's detections is of one landmark.
+/// Each of a member's detections must belong to one landmark.
 std::vector<model::KeyframeDetection> detections(const keyframe2_t& wire, Checks& checks) {
   std::vector<model::KeyframeDetection> result;
   result.reserve(wire.detections.size());

@@ -1,4 +1,4 @@
-// Landmarks and keyframes of maps, which several types have.
+// Landmarks and keyframes of maps, common to several types.
 #pragma once
 
 #include <limits>

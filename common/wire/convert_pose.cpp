@@ -4,7 +4,7 @@
 namespace understory::wire {
 namespace {
 
-/// What both versions have, but for the status.
+/// Common part of both versions, except the status.
 template <class Wire>
 model::SlamPose slam_pose(const Wire& wire, Checks& checks) {
   checks.pose("submap_T_vehicle", wire.submap_T_vehicle);
@@ -31,7 +31,7 @@ model::SlamPose slam_pose(const Wire& wire, Checks& checks) {
   return pose;
 }
 
-/// How it was made.
+/// Copies the status.
 void copy_status(std::int8_t status, model::SlamPose& pose) {
   pose.is_coasting = status == slam_pose2_t::COASTING;
   pose.is_lost = status == slam_pose2_t::LOST;

@@ -89,7 +89,7 @@ level_error_t to_wire(const model::LevelError& value) {
   return wire;
 }
 
-/// What both versions have.
+/// Common part of both versions.
 template <class Wire>
 model::Odometry odometry(const Wire& wire, Checks& checks) {
   checks.consistent(wire.from_utime >= 0 && wire.from_utime <= wire.utime, "from_utime <= utime");

@@ -1,4 +1,4 @@
-// Checks and copies that several conversions share.
+// Checks and copies common to several conversions.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ inline constexpr double kFastestMps = 1000.0;
 
 /// Largest index of a detection in its scan.
 inline constexpr double kMostDetections = 1e9;
-/// Ids of maps are positive in the 16 bit that a landmark's id has for its map.
+/// Largest id of a map: positive in the 16 bits for the map in a landmark's id.
 inline constexpr double kMostMaps = 0x7fff;
 
 /// Stamp and number of a message.
@@ -46,13 +46,13 @@ void copy_matrix(const Eigen::Matrix<double, N, N>& matrix, SquareArray<N>& rows
   }
 }
 
-/// Into an array of at least the vector's size.
+/// Copies into an array of at least the vector's size.
 template <class Vector>
 void copy_vector(const Vector& vector, double* out) {
   for (Eigen::Index i = 0; i < vector.size(); ++i) out[i] = vector[i];
 }
 
-/// Checks position, radius and kind, which every landmark type has.
+/// Checks position, radius and kind, common to all landmark types.
 template <class Wire>
 void check_landmark(const Wire& wire, Checks& checks) {
   for (const double coordinate : wire.position_m) {
@@ -62,7 +62,7 @@ void check_landmark(const Wire& wire, Checks& checks) {
   checks.range("kind", wire.kind, 0, 1);
 }
 
-/// Checks and takes the three fields of a message that describe the field of view.
+/// Checks and converts the three fields of the field of view.
 template <class Wire>
 model::FieldOfView field_of_view(const Wire& wire, Checks& checks) {
   constexpr double kFullCircle = 2.0 * std::numbers::pi;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kMostIds = 9.3e18;
 
-/// Number of a map and of something in it; `lowest`: 0 where there may be none.
+/// Number of a map or of an item in it; `lowest`: 0 if it may be missing.
 std::uint64_t number(std::string_view field, std::int64_t wire, Checks& checks,
                      double lowest = 1.0) {
   checks.range(field, static_cast<double>(wire), lowest, kMostIds);

@@ -15,26 +15,27 @@ constexpr double kFinestTimeStepS = 1e-6;
 constexpr double kLargestCount = 32767.0;
 constexpr double kLongestTurnS = 10.0;
 
-/// The finest of `finest` * 2^k with which `largest` fits into 16 bits: the same again when what
-/// was rounded is sent on.
+/// The finest of `finest` * 2^k with which `largest` fits into 16 bits: rounded values that are
+/// sent on get the same step.
 double step_for(double largest, double finest) {
   double step = finest;
   while (largest > step * kLargestCount) step *= 2.0;
   return step;
 }
 
-/// To the nearest, halves to even, as the sum with a number whose last bit counts ones: without a
-/// call per coordinate. Precondition: fits into 16 bits.
+/// Rounds to nearest, halves to even, by adding a number whose last bit has the value 1: no call
+/// per coordinate. Precondition: fits into 16 bits.
 std::int16_t rounded(float value, double inverse_step) {
   constexpr double kOnes = 0x1.8p52;
   const double sum = static_cast<double>(value) * inverse_step + kOnes;
   return static_cast<std::int16_t>(std::bit_cast<std::int64_t>(sum));
 }
 
-/// Sizes of floats as integers: in the same order, infinity after all numbers, NaN after infinity.
+/// Magnitudes of floats as integers in the same order; infinity is above all numbers, NaN above
+/// infinity.
 std::uint32_t size_bits(float value) { return std::bit_cast<std::uint32_t>(value) & 0x7fffffffU; }
 
-/// Fills the points in, with steps that hold the largest. Throws where one is not finite.
+/// Writes the points with steps that fit the largest coordinate. Throws where one is not finite.
 void write_points(const std::vector<model::SweepPoint>& points, lidar_sweep_t& wire) {
   std::uint32_t farthest = 0;
   std::uint32_t longest = 0;

@@ -38,7 +38,7 @@ void copy_diagnostics(const Wire& wire, model::MapUpdate& update, Checks& checks
   update.reason = wire.reason;
 }
 
-/// What all versions have.
+/// Common part of all versions.
 template <class Wire>
 model::MapUpdate map_update(const Wire& wire, Checks& checks) {
   checks.range("keyframe_seq", static_cast<double>(wire.keyframe_seq), 0.0, 9.3e18);
@@ -73,7 +73,7 @@ std::vector<model::ScanReference> scans(const Wire& wire, Checks& checks) {
   return result;
 }
 
-/// Each detection is one landmark or none.
+/// Each detection must have one landmark or none.
 template <class Wire>
 std::vector<model::IdentifiedDetection> identified(const Wire& wire, Checks& checks) {
   std::vector<model::IdentifiedDetection> result;
@@ -138,7 +138,7 @@ std::vector<model::ExpectedLandmark> expected(const slam_update2_t& wire, Checks
   return result;
 }
 
-/// Both versions that say what was seen.
+/// Common part of the two versions with detections.
 template <class Wire>
 Result<model::MapUpdate> update_with_detections(const Wire& wire) {
   Checks checks;

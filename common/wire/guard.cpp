@@ -7,7 +7,7 @@
 namespace understory::wire {
 namespace {
 
-/// LCM's own lengths are 32 bit and signed; nothing larger can be decoded.
+/// LCM's own lengths are signed 32-bit numbers; larger messages cannot be decoded.
 constexpr std::size_t kMostBytes = std::numeric_limits<std::int32_t>::max();
 
 std::size_t size_of(FieldKind kind) {
@@ -39,7 +39,7 @@ bool is_finite_double(const std::uint8_t* at) {
   return (at[0] & 0x7FU) != 0x7FU || (at[1] & 0xF0U) != 0xF0U;
 }
 
-/// Microseconds up to the year 2255: what a double holds exactly, as JSON and TUM files need it.
+/// Microseconds up to the year 2255: exact in a double, as JSON and TUM files require.
 constexpr std::int64_t kLatestUtime = std::int64_t{1} << 53U;
 
 std::optional<Refusal> check_header(const MessageHeader& header) {
@@ -52,7 +52,7 @@ std::optional<Refusal> check_header(const MessageHeader& header) {
   return std::nullopt;
 }
 
-/// Walks bytes along layouts; its depth is that of the types, which is fixed.
+/// Checks bytes against layouts; its depth is that of the types, which is fixed.
 class Walker {
  public:
   explicit Walker(std::span<const std::uint8_t> bytes) : left_(bytes) {}
@@ -158,7 +158,7 @@ class Walker {
     text_ = std::move(text);
     return false;
   }
-  /// The path is put together from the inside out, on refusal only.
+  /// The path is built from the inside out, only on refusal.
   bool refused_in(std::string_view field) {
     prepend(std::string(field));
     return false;

@@ -1,4 +1,4 @@
-// How each wire type's bytes lie, as data: generated from lcmtypes/*.lcm when the project is built.
+// Byte layouts of the wire types as data, generated from lcmtypes/*.lcm by the build.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace understory::wire {
 
-/// The types of fields that LCM has.
+/// LCM's types of fields.
 enum class FieldKind : std::uint8_t {
   kInt8,
   kInt16,
@@ -24,14 +24,14 @@ enum class FieldKind : std::uint8_t {
 
 struct Layout;
 
-/// A field holds `fixed` elements, times the count in slot `counted_by` where that is not -1.
+/// A field has `fixed` elements, times the count in slot `counted_by` if that is not -1.
 struct Field {
   std::string_view name;
   FieldKind kind = FieldKind::kByte;
-  const Layout* part = nullptr;  ///< Of kStruct.
+  const Layout* part = nullptr;  ///< Layout of a kStruct.
   std::uint32_t fixed = 1;
   int counted_by = -1;
-  int counts = -1;  ///< The slot that this integer's value fills; -1 = it counts nothing.
+  int counts = -1;  ///< The slot for this integer's value; -1 = it is not a count.
 };
 
 /// A struct may have this many counts.
@@ -41,22 +41,22 @@ inline constexpr std::size_t kMostCounts = 8;
 struct Layout {
   std::string_view name;
   std::span<const Field> fields;
-  std::size_t min_bytes = 0;  ///< Of the shortest one, without the fingerprint.
+  std::size_t min_bytes = 0;  ///< Least size, without the fingerprint.
 };
 
 /// A type of lcmtypes/.
 struct WireType {
   const Layout* layout = nullptr;
   std::int64_t (*fingerprint)() = nullptr;  ///< LCM's hash of names and types.
-  bool is_message = false;  ///< Begins with utime and seq: it travels on a channel of its own.
+  bool is_message = false;  ///< Begins with utime and seq: it has a channel of its own.
 };
 
 /// Every type of lcmtypes/, in order of name.
 std::span<const WireType> wire_types();
 
-/// By name (`landmarks_t`); null where there is none.
+/// By name (`landmarks_t`); null = none.
 const WireType* find_wire_type(std::string_view name);
-/// By fingerprint; null where there is none.
+/// By fingerprint; null = none.
 const WireType* find_wire_type(std::int64_t fingerprint);
 
 }  // namespace understory::wire

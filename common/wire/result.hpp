@@ -1,4 +1,4 @@
-// What comes back where data may be wrong.
+// Results of functions whose input may be wrong.
 #pragma once
 
 #include <cstdint>
@@ -9,65 +9,66 @@
 
 namespace understory::wire {
 
-/// Why a message or a value was not taken. The names (`to_string`) are what HEALTH and LOG show.
+/// The reason of a refusal or a fault. HEALTH and LOG show its name (`to_string`).
 enum class Reason : std::uint8_t {
-  kTooShort,            ///< Ends before its type does.
+  kTooShort,            ///< Shorter than its type.
   kTooLong,             ///< Bytes are left over.
-  kWrongType,           ///< The fingerprint is another type's (or another version's).
-  kBadCount,            ///< A count is negative or promises more than there is.
+  kWrongType,           ///< The fingerprint belongs to another type or version.
+  kBadCount,            ///< A count is negative or exceeds the remaining bytes.
   kBadString,           ///< A length below one, no terminator, or a zero inside.
   kNotFinite,           ///< NaN or infinite.
-  kOutOfRange,          ///< A value that its quantity cannot have.
-  kNotSymmetric,        ///< Of a covariance.
+  kOutOfRange,          ///< A value impossible for its quantity.
+  kNotSymmetric,        ///< A covariance that is not symmetric.
   kNotPositive,         ///< A covariance that is not positive semidefinite.
   kInconsistent,        ///< Fields that contradict each other.
-  kDuplicate,           ///< Came before.
-  kLate,                ///< Came after a later one.
-  kClockJump,           ///< A stamp far from the others'.
+  kDuplicate,           ///< Received before.
+  kLate,                ///< Received after a later one.
+  kClockJump,           ///< A stamp far from the others.
   kTooLarge,            ///< More than the configuration allows in one message.
-  kQueueFull,           ///< Shed: more came than could be handled.
+  kQueueFull,           ///< Dropped: more messages arrived than could be handled.
   kNotSent,             ///< The bus refused it.
   kStageFailed,         ///< The stage threw.
   kSnapshotDamaged,     ///< The saved state cannot be read.
   kJournalDamaged,      ///< The journal is cut or damaged.
   kStateNotKept,        ///< The state directory cannot be written.
-  kSensorSilent,        ///< Nothing came from a sensor that is configured.
+  kSensorSilent,        ///< No message from a configured sensor.
   kSensorFrozen,        ///< A sensor repeats the same reading.
   kSaturated,           ///< At the end of the sensor's range.
   kNoPointTimes,        ///< A sweep whose points have no times: not de-skewed.
-  kPartsMissing,        ///< A sweep of which parts were lost.
-  kNoMotion,            ///< A sweep for whose time no motion is known: not de-skewed.
-  kRestarted,           ///< Something went on after a pause, or began anew.
+  kPartsMissing,        ///< A sweep with lost parts.
+  kNoMotion,            ///< A sweep at a time without known motion: not de-skewed.
+  kRestarted,           ///< A sender continued after a pause, or restarted.
   kNotCalibrated,       ///< The vehicle moved before the standstill was long enough.
-  kReceiveBufferSmall,  ///< The kernel grants less socket buffer than asked for.
-  kLost,                ///< The stage does not know where the vehicle or its landmarks are.
-  kRolledBack,          ///< Updates contradict the map and are taken back.
-  kWithheld,            ///< Results that are not good enough are not given out.
+  kReceiveBufferSmall,  ///< The kernel grants a smaller socket buffer than requested.
+  kLost,                ///< The stage has no position of the vehicle or its landmarks.
+  kRolledBack,          ///< Updates contradict the map and are undone.
+  kWithheld,            ///< Results of insufficient quality are not published.
   kDiverged,            ///< Errors are far larger than stated.
-  kInputRefused,        ///< Much of what comes in is refused.
-  kMiscalibrated,   ///< Sensors contradict each other: a mounting or a scale is not as configured.
-  kNewMap,          ///< A lost mapper began another map, in a frame of its own.
-  kNoiseMisstated,  ///< What comes in contradicts the noise that it states.
-  kNotStored,       ///< What was handed over has not been confirmed by who keeps it.
-  kDiskFull,        ///< There is no room for the file that is written.
-  kFileReadOnly,    ///< The file, or its folder, cannot be written.
-  kFileDamaged,     ///< The file's content is not what was written.
-  kFileForeign,     ///< The file is something else.
-  kFileInUse,       ///< Another process has the file open.
-  kFileUnusable,    ///< The file cannot be opened or read, or is of another version.
-  kClientRefused,   ///< More web clients, or commands of theirs, than are let in.
+  kInputRefused,        ///< Much of the input is refused.
+  kMiscalibrated,       ///< Sensors contradict each other: a mounting or a scale differs from the
+                        ///< configuration.
+  kNewMap,              ///< A lost mapper began another map with its own frame.
+  kNoiseMisstated,      ///< The input contradicts its stated noise.
+  kNotStored,           ///< The store has not confirmed a submap that was handed over.
+  kDiskFull,            ///< There is no space for the written file.
+  kFileReadOnly,        ///< The file, or its folder, cannot be written.
+  kFileDamaged,         ///< The file's content differs from the written content.
+  kFileForeign,         ///< The file is of another kind.
+  kFileInUse,           ///< Another process has the file open.
+  kFileUnusable,        ///< The file cannot be opened or read, or has another version.
+  kClientRefused,       ///< Too many web clients, or too many of their commands.
 };
 
 /// Name of the reason, lower_snake.
 std::string_view to_string(Reason reason);
 
-/// A refusal: the reason code, and a text for a person that names the place.
+/// A refusal: the reason, and a text for people with the place.
 struct Refusal {
   Reason reason = Reason::kInconsistent;
   std::string detail;
 };
 
-/// A value, or why there is none. Asking for the part that is not there throws
+/// A value, or the reason why there is none. Access to the missing part throws
 /// std::bad_variant_access.
 template <class T>
 class [[nodiscard]] Result {
@@ -83,7 +84,7 @@ class [[nodiscard]] Result {
   T& value() { return std::get<0>(content_); }
   /// The value.
   const T& value() const { return std::get<0>(content_); }
-  /// Why there is no value.
+  /// The reason why there is no value.
   const Refusal& refusal() const { return std::get<1>(content_); }
   /// The value's members.
   T* operator->() { return &value(); }
