@@ -27,7 +27,7 @@ struct ProcStat {
   std::uint64_t start_ticks = 0;
 };
 
-/// proc(5): fields 3 and 22 of /proc/PID/stat; the name in field 2 may hold spaces and brackets.
+/// proc(5): fields 3 and 22 of /proc/PID/stat; the name in field 2 may contain spaces and brackets.
 std::optional<ProcStat> read_stat(pid_t pid) {
   std::ifstream file(fmt::format("/proc/{}/stat", pid));
   std::string line;
@@ -64,7 +64,7 @@ std::vector<char*> pointers(std::vector<std::string>& strings) {
   return result;
 }
 
-/// The caller's environment with `changes` on top.
+/// The caller's environment with `changes` applied.
 std::vector<std::string> merged_environment(const std::vector<std::string>& changes) {
   std::vector<std::string> merged = changes;
   for (char** entry = environ; *entry != nullptr; ++entry) {
@@ -119,7 +119,7 @@ std::optional<ChildProcess> ChildProcess::adopt(pid_t pid, std::uint64_t start_t
   const int pidfd = open_pidfd(pid);
   if (pidfd < 0) return std::nullopt;
   ChildProcess process(pid, pidfd, start_ticks);
-  // Looked at after the handle is held: the number cannot change hands any more.
+  // Read after the handle is open, so the number cannot be reused any more.
   const auto stat = read_stat(pid);
   if (!stat || stat->start_ticks != start_ticks || stat->state == 'Z') return std::nullopt;
   return process;
@@ -151,7 +151,7 @@ std::optional<Ending> ChildProcess::ended() const {
     (info.si_code == CLD_EXITED ? ending.exit_code : ending.signal) = info.si_status;
     return ending;
   }
-  // Not our child: only the handle shows whether it has ended.
+  // Not our child, so only the handle shows its end.
   pollfd handle{pidfd_, POLLIN, 0};
   if (::poll(&handle, 1, 0) <= 0) return std::nullopt;
   return Ending{.known = false};

@@ -17,7 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// For launches of this user with this state directory; nobody else can make files in it.
+/// Directory for launches of this user with this state directory; other users cannot create files
+/// in it.
 fs::path spare_directory(const fs::path& state_directory) {
   std::error_code error;
   const fs::path temporary = fs::temp_directory_path(error);
@@ -25,21 +26,21 @@ fs::path spare_directory(const fs::path& state_directory) {
   return temporary / fmt::format("understory-{}-{:016x}", ::geteuid(), hash);
 }
 
-/// False: it is not there, or is another user's.
+/// False: it does not exist, or belongs to another user.
 bool is_own(const fs::path& directory) {
   struct stat found {};
   return ::lstat(directory.c_str(), &found) == 0 && S_ISDIR(found.st_mode) &&
          found.st_uid == ::geteuid();
 }
 
-/// Made where missing. False: it cannot be, or is another user's.
+/// Creates it if missing. False: creation failed, or it belongs to another user.
 bool make_own(const fs::path& directory) {
   ::mkdir(directory.c_str(), 0700);
   return is_own(directory);
 }
 
-/// On a disk that has become read-only, an existing file can be locked all the same. -1 where there
-/// is none; `error` says why the file cannot be written.
+/// On a disk that has become read-only, an existing file can still be locked. -1 = no file;
+/// `error`: reason why the file cannot be written.
 int open_lock(const fs::path& file, std::error_code& error) {
   const int lock = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (lock >= 0) return lock;

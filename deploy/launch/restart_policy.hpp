@@ -1,4 +1,4 @@
-// When a process that died is started again.
+// Decides when a dead process is restarted.
 #pragma once
 
 #include <chrono>
@@ -14,28 +14,29 @@ using std::chrono::milliseconds;  ///< The unit of all its times.
 struct RestartPolicyParameters {
   milliseconds first_backoff{10};
   milliseconds max_backoff{1000};
-  std::size_t max_deaths = 5;  ///< Within `window` they are too many.
+  std::size_t max_deaths = 5;  ///< This many within `window` are too many.
   milliseconds window{30'000};
   milliseconds slow_retry{30'000};  ///< Wait after too many of them.
 };
 
-/// Short waits at first, since a vehicle is blind meanwhile; doubled with every death in the
-/// window, so that a crash loop does not eat the processor. After too many deaths one try per
-/// `slow_retry`: the cause (a full disk, say) may end during the drive.
+/// Waits are short at first, because the vehicle lacks the process meanwhile; they double with
+/// every death in the window, so that a crash loop does not use the processor. After too many
+/// deaths there is one try per `slow_retry`, because the cause (e.g. a full disk) may end during
+/// the drive.
 class RestartPolicy {
  public:
-  /// Without a death so far.
+  /// Starts without deaths.
   explicit RestartPolicy(const RestartPolicyParameters& parameters = {})
       : parameters_(parameters) {}
 
-  /// Counts the death of a process that lived for `lived`; gives how long to wait before the next
+  /// Counts the death of a process that lived for `lived`; returns the time to wait before the next
   /// start.
   milliseconds died(Clock::time_point now, Clock::duration lived);
-  /// Trying again at once is useless: as if there had been too many deaths. Gives how long to wait.
+  /// Call it if an immediate retry is useless: acts like too many deaths. Returns the time to wait.
   milliseconds give_up();
-  /// Whether there were too many deaths; until a process has lived for a whole window.
+  /// Whether there were too many deaths; false again when a process has run for a whole window.
   bool is_given_up() const { return is_given_up_; }
-  /// A process that was given up has lived for a whole window: it counts as sound again.
+  /// Call it when a given-up process has run for a whole window: it is no longer given up.
   void forgive();
   /// Deaths within the window before the last one.
   std::size_t deaths_in_window() const { return deaths_.size(); }

@@ -13,7 +13,7 @@ constexpr int kWrongUsage = 2;  // Exit status of a process that refuses its con
 
 double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
-/// Later by a pause, but not in the future.
+/// Postpones a time by a pause, but not into the future.
 void postpone(std::optional<Clock::time_point>& time, Clock::duration pause,
               Clock::time_point now) {
   if (time) time = std::min(*time + pause, now);
@@ -97,8 +97,8 @@ void Supervisor::launch(Entry& entry, Clock::time_point now) {
   }
 }
 
-/// At the first start the installation is wrong; later it is the computer that lacks something
-/// (memory, a disk), which may come back.
+/// At the first start the cause is the installation; later the computer lacks a resource (memory, a
+/// disk), which may return.
 void Supervisor::cannot_start(Entry& entry, const std::string& why, Clock::time_point now) {
   entry.died = now;
   entry.last_ending = fmt::format("cannot be started: {}", why);
@@ -115,8 +115,7 @@ void Supervisor::heartbeat(const std::string& name, pid_t pid, Clock::time_point
   }
 }
 
-/// What was sent in a pause may still be on its way, or is lost: nothing follows from not having
-/// heard it.
+/// HEALTH sent during a pause may be delayed or lost, so its absence is no evidence.
 void Supervisor::count_pause(Clock::time_point now) {
   const Clock::duration pause = stepped_ ? now - *stepped_ : Clock::duration(0);
   stepped_ = now;
@@ -256,20 +255,20 @@ void Supervisor::stop(Clock::time_point now) {
   if (!others_run()) ask_to_end(true, now);
 }
 
-/// Those that end last, or the others.
+/// Asks the processes with `ends_last`, or the others, to end.
 void Supervisor::ask_to_end(bool last, Clock::time_point now) {
   stop_time_ = now;
   last_are_asked_ = last;
   killed_ = false;
   for (auto& entry : entries_) {
     if (!entry.child || entry.spec.ends_last != last) continue;
-    // A stopped process takes no SIGTERM before it goes on.
+    // A stopped process receives SIGTERM only after it continues.
     entry.child->signal(SIGTERM);
     entry.child->signal(SIGCONT);
   }
 }
 
-/// Whether one runs that does not end last.
+/// Whether a process without `ends_last` runs.
 bool Supervisor::others_run() const {
   return std::ranges::any_of(
       entries_, [](const Entry& entry) { return entry.child && !entry.spec.ends_last; });

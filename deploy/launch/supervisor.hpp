@@ -1,7 +1,7 @@
-// Starts processes, notices when one dies or hangs, starts it again, stops all cleanly.
+// Starts processes, detects deaths and hangs, restarts processes, and stops all cleanly.
 //
 // It has no loop and no clock of its own: the caller polls the descriptors and calls step() with
-// the time. So the same object runs in `understory launch` and in tests.
+// the time. The same object runs in `understory launch` and in tests.
 #pragma once
 
 #include <functional>
@@ -19,17 +19,18 @@ namespace understory::launch {
 struct ProcessSpec {
   std::string name;  ///< As in its HEALTH messages.
   Command command;
-  bool sends_health = true;  ///< False: not having heard it says nothing.
-  bool ends_last = false;  ///< It is asked to end when all others have: it keeps their last words.
+  bool sends_health = true;  ///< False: missing HEALTH has no meaning.
+  /// It is stopped after all others, because it records their last messages.
+  bool ends_last = false;
 };
 
-/// A process that is stopped (SIGSTOP) is noticed in /proc within a tenth of a second, hence the
-/// short times. Any other hang shows only as missing HEALTH, which comes once a second: three
-/// missed are DEGRADED, five a hang. Fewer would restart healthy processes on a busy computer. A
-/// process that was never heard is DEGRADED, but not killed.
+/// A stopped process (SIGSTOP) is detected in /proc within a tenth of a second, hence the short
+/// times. Any other hang appears only as missing HEALTH, which is published once a second: three
+/// missing are DEGRADED, five are a hang. Fewer would restart healthy processes on a busy computer.
+/// A process that never sent HEALTH is DEGRADED, but not killed.
 ///
-/// Time in which the supervisor itself did not run (it was stopped, the computer was suspended or
-/// overloaded) is no silence of a process: all these times are extended by it.
+/// Time in which the supervisor itself did not run (stopped, or the computer was suspended or
+/// overloaded) does not count as silence: all these times are extended by it.
 struct SupervisorParameters {
   RestartPolicyParameters restart;
   milliseconds stopped_degraded{300};
@@ -38,16 +39,18 @@ struct SupervisorParameters {
   milliseconds silent_restart{5000};
   milliseconds never_heard_degraded{10000};  ///< Since its start.
   milliseconds stop_timeout{900};            ///< From SIGTERM to SIGKILL.
-  milliseconds look_every{100};              ///< At the latest; hangs show in no descriptor.
-  milliseconds pause{300};                   ///< Longer between two steps: it did not run.
+  /// Longest interval between checks, because no descriptor shows a hang.
+  milliseconds look_every{100};
+  /// A longer time between two steps means that the supervisor did not run.
+  milliseconds pause{300};
 };
 
-/// What a process is doing. One that is given up is tried again from time to time.
+/// State of a process. A given-up process is tried again from time to time.
 enum class ProcessState { kWaiting, kRunning, kDegraded, kFinished, kGivenUp };
 /// "waiting", "running", "degraded", "finished", "given up".
 const char* to_string(ProcessState state);
 
-/// How a process is, for reports and for the registry.
+/// Status of a process, for reports and for the registry.
 struct ProcessStatus {
   std::string name;
   ProcessState state = ProcessState::kWaiting;
@@ -55,27 +58,27 @@ struct ProcessStatus {
   std::uint64_t start_ticks = 0;
   std::uint64_t restarts = 0;
   std::string last_ending;   ///< Empty before the first death.
-  bool is_given_up = false;  ///< Too many deaths; until it has run for a whole window.
+  bool is_given_up = false;  ///< Too many deaths; ends when it has run for a whole window.
 };
 
 /// All processes of a launch.
 class Supervisor {
  public:
-  /// Called with one line for everything that happens: (process, text).
+  /// Called with one line for every event: (process, text).
   using Report = std::function<void(const std::string&, const std::string&)>;
   /// Starts nothing yet.
   Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters, Report report);
 
-  /// Takes over those of `known` that still run, starts the others; restarts go on being counted.
+  /// Takes over those of `known` that still run, and starts the others; counts of restarts
+  /// continue.
   void start(const std::vector<ProcessStatus>& known, Clock::time_point now);
-  /// A HEALTH message of a process; one of another pid than that of the running process is not
-  /// counted.
+  /// A HEALTH message of a process; a message with another pid than the running process is ignored.
   void heartbeat(const std::string& name, pid_t pid, Clock::time_point now);
-  /// Notices deaths and hangs, starts what is due. Cheap; to be called whenever a descriptor is
-  /// ready and at the latest at wake_up(), after heartbeat() for all HEALTH that waits.
+  /// Detects deaths and hangs, starts due processes. Cheap; call it whenever a descriptor is ready
+  /// and at the latest at wake_up(), after heartbeat() for all waiting HEALTH.
   void step(Clock::time_point now);
-  /// Asks every process to end, those that end last when the others have; step() goes on until
-  /// stopped().
+  /// Asks every process to end, those with `ends_last` after the others; continue to call step()
+  /// until stopped().
   void stop(Clock::time_point now);
 
   /// True after stop().
@@ -83,11 +86,11 @@ class Supervisor {
   bool stopped() const;  ///< No process runs and none will be started.
   /// Readable when a process has ended: for poll().
   std::vector<int> descriptors() const;
-  /// When step() must be called at the latest.
+  /// Latest time of the next step().
   Clock::time_point wake_up(Clock::time_point now) const;
   /// One per process, in the order of the specs.
   std::vector<ProcessStatus> status() const;
-  /// Processes that were refused at their first start (exit status 2: wrong configuration).
+  /// Processes that refused at their first start (exit status 2: wrong configuration).
   const std::vector<std::string>& refused() const { return refused_; }
 
  private:
@@ -98,7 +101,7 @@ class Supervisor {
     std::optional<ChildProcess> child;
     std::optional<Clock::time_point> start_due;
     Clock::time_point started;
-    Clock::time_point listened_since;  ///< Its start, later by the supervisor's pauses since.
+    Clock::time_point listened_since;  ///< Its start, plus the supervisor's pauses since then.
     Clock::time_point died;
     std::optional<Clock::time_point> last_heartbeat;
     std::optional<Clock::time_point> stopped_since;
@@ -121,11 +124,10 @@ class Supervisor {
   std::vector<Entry> entries_;
   SupervisorParameters parameters_;
   Report report_;
-  std::optional<Clock::time_point> stepped_;  ///< The last time.
-  std::optional<Clock::time_point>
-      stop_time_;                ///< When processes were asked to end, the last time.
-  bool last_are_asked_ = false;  ///< Those that end last, too.
-  bool killed_ = false;          ///< Of those that were asked, who was late.
+  std::optional<Clock::time_point> stepped_;    ///< Time of the last step.
+  std::optional<Clock::time_point> stop_time_;  ///< Time of the last request to end.
+  bool last_are_asked_ = false;                 ///< The processes with `ends_last` were asked too.
+  bool killed_ = false;                         ///< A process was late and was killed.
   std::vector<std::string> refused_;
 };
 
