@@ -7,11 +7,11 @@
 
 namespace understory::cli {
 
-/// The numbers of a run without its series. Keys: deploy/cli/accuracy.md. A measure that the
-/// run does not have (a path that is too short, no covariance) is null.
+/// The numbers of a run without its series. Keys: deploy/cli/accuracy.md. A measure without data
+/// (too short a path, no covariance) is null.
 nlohmann::ordered_json accuracy_summary(const DriveAccuracy& accuracy);
 
-/// Prints what accuracy_summary() gave, grouped, with units.
+/// Prints the result of accuracy_summary(), grouped, with units.
 void print_accuracy(const nlohmann::ordered_json& summary);
 
 }  // namespace understory::cli

@@ -18,7 +18,7 @@ std::uint64_t count_of(const DriveAccuracy& accuracy, model::MapUpdateStatus sta
   return found == accuracy.updates.end() ? 0 : found->second;
 }
 
-/// Messages that the processes report as missing.
+/// Messages reported as missing by the processes.
 struct Drops {
   std::int64_t lost = 0;
   std::int64_t malformed = 0;
@@ -85,7 +85,8 @@ Json closures_json(const ClosureCounts& closures) {
           {"refused", closures.refused}, {"refused_by_reason", Json(closures.refused_by_reason)}};
 }
 
-/// Wrong poses, and whether a process said so; `told` is null where none said how it was.
+/// Wrong poses, and whether a process reported them; `told` is null where no process reported its
+/// state.
 Json wrong_json(const DriveAccuracy& accuracy) {
   std::size_t poses = 0;
   int told = 0;
@@ -128,7 +129,7 @@ Json doubles_json(const LandmarkAccuracy& landmarks) {
   return {{"pairs", landmarks.double_pairs}, {"at_a_true_one", landmarks.at_a_true_one}};
 }
 
-/// The largest first.
+/// Bytes, the largest first.
 Json bytes_json(const std::map<std::string, std::uint64_t>& bytes_by_channel) {
   std::vector<std::pair<std::string, std::uint64_t>> channels(bytes_by_channel.begin(),
                                                               bytes_by_channel.end());

@@ -11,10 +11,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Of the table's first column.
+/// Width of the table's first column.
 constexpr int kNameWidth = 36;
 
-/// `value` with `format`; a dash where there is none.
+/// `value` with `format`; a dash = no value.
 std::string number_or_dash(const Json& value, fmt::format_string<double> format) {
   return value.is_null() ? "-" : fmt::format(format, value.get<double>());
 }
@@ -110,7 +110,7 @@ void print_nees(const Json& nees) {
   });
 }
 
-/// "NAME COUNT" of each, joined; what did not happen is left out.
+/// "NAME COUNT" of each, joined; zero counts are left out.
 std::string listed(const Json& counts) {
   std::string text;
   for (const auto& [name, count] : counts.items()) {
@@ -162,7 +162,7 @@ void print_counts(const Json& counts, const Json& doubles) {
   }
 }
 
-/// Those with the most bytes.
+/// Prints the channels with the most bytes.
 void print_bytes(const Json& channels) {
   constexpr std::size_t kShown = 5;
   std::string text;

@@ -20,7 +20,7 @@ namespace {
 
 constexpr model::Utime kLongestGap_us = 2'000'000;
 
-/// Where a heading stands; none where the table has none.
+/// Index of a heading; none where the table has none.
 std::optional<std::size_t> column_named(const io::TextTable& table, std::string_view name) {
   const auto& cells = table.heading.cells;
   const auto found = std::ranges::find(cells, name);
@@ -28,7 +28,7 @@ std::optional<std::size_t> column_named(const io::TextTable& table, std::string_
   return static_cast<std::size_t>(found - cells.begin());
 }
 
-/// The columns by which a table of control points names places of the map.
+/// The columns of a table of control points for positions in the map.
 struct MapColumns {
   std::optional<std::size_t> x;
   std::optional<std::size_t> y;
@@ -86,7 +86,7 @@ std::optional<Fix> placed_fix(const wire::Bytes& bytes) {
   return Fix{fix->utime, {message->longitude_deg, message->latitude_deg}, fix->sigma_m};
 }
 
-/// The fixes of a log by channel, in order of time: those that were checked repeat the raw ones.
+/// The fixes of a log by channel, in order of time; checked fixes repeat the raw ones.
 std::vector<Fix> fixes_in(const std::string& log) {
   std::array<std::vector<Fix>, 2> by_channel;
   io::LcmLogReader reader(log);
@@ -104,7 +104,7 @@ std::vector<Fix> fixes_in(const std::string& log) {
   return fixes;
 }
 
-/// Between the fixes before and after; none in a gap.
+/// Interpolates between the fixes before and after; none in a gap.
 std::optional<Fix> fix_at(const std::vector<Fix>& fixes, model::Utime utime) {
   const auto after = std::ranges::lower_bound(fixes, utime, {}, &Fix::utime);
   if (after == fixes.end()) return std::nullopt;
@@ -115,7 +115,7 @@ std::optional<Fix> fix_at(const std::vector<Fix>& fixes, model::Utime utime) {
   if (gap > kLongestGap_us) return std::nullopt;
   const double share = static_cast<double>(utime - before.utime) / static_cast<double>(gap);
   Eigen::Vector2d step_deg = after->at_deg - before.at_deg;
-  step_deg.x() = std::remainder(step_deg.x(), 360.0);  // Over the date line, too.
+  step_deg.x() = std::remainder(step_deg.x(), 360.0);  // Also across the date line.
   return Fix{utime, before.at_deg + share * step_deg, std::max(before.sigma_m, after->sigma_m)};
 }
 
@@ -147,7 +147,7 @@ NamedPoints control_points_in(const std::string& file, const std::string& system
     point.map_m = is_by_id ? landmark_named(table, row, row.cells[*columns.id], maps)
                            : Eigen::Vector2d(number(*columns.x), number(*columns.y));
     point.world = {coordinate(io::LandmarkColumn::kX), coordinate(io::LandmarkColumn::kY)};
-    // Surveyed points count alike; a wrong one must show, not be passed over.
+    // Surveyed points have equal weight; a wrong one must be visible, not be ignored.
     point.sigma_m = 1e3;
     known.names.push_back(fmt::format("line {}", row.line));
   }

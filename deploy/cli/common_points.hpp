@@ -1,4 +1,4 @@
-// Points of a map that are known on the earth: surveyed ones, and fixes of a drive.
+// Common points of a map and the earth: control points, and fixes of a drive.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace understory::cli {
 
-/// Points with what they are called in messages.
+/// Points with names for messages.
 struct NamedPoints {
   std::vector<reference_system::CommonPoint> points;
   std::vector<std::string> names;
@@ -22,15 +22,15 @@ struct NamedPoints {
 NamedPoints control_points_in(const std::string& file, const std::string& system,
                               const std::vector<map_file::StoredMap>& maps);
 
-/// How fixes are laid beside keyframes.
+/// Options of fixes at keyframes.
 struct FixOptions {
-  Eigen::Vector2d antenna_m = Eigen::Vector2d::Zero();  ///< In the vehicle: forward, left.
-  double least_sigma_m = 0.5;                           ///< For fixes that state less, or nothing.
+  Eigen::Vector2d antenna_m = Eigen::Vector2d::Zero();  ///< Position in the vehicle: forward, left.
+  double least_sigma_m = 0.5;                           ///< Least sigma of a fix.
 };
 
-/// The keyframes of a map at whose times the fixes of a log (RAW_GNSS, else GNSS) say where the
-/// vehicle was, between two fixes at most 2 s apart. Fixes without latitude and longitude are not
-/// counted. Longitude and latitude of WGS 84. Throws io::LogError.
+/// The keyframes of a map with a position from the fixes of a log (RAW_GNSS, else GNSS),
+/// interpolated between two fixes at most 2 s apart. Fixes without latitude and longitude are
+/// skipped. Longitude and latitude are in WGS 84. Throws io::LogError.
 NamedPoints fixes_at_keyframes(const std::string& log, const map_file::StoredMap& map,
                                const FixOptions& options);
 

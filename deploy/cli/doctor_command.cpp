@@ -1,4 +1,4 @@
-// `understory doctor`: checks this computer and the processes on it, and lists what to do.
+// `understory doctor`: checks this computer and the processes on it, and lists remedies.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -54,12 +54,12 @@ std::vector<std::string> launched_programs() {
       names.push_back(std::move(name));
     }
   } catch (const bus::ConfigurationError&) {
-    // A directory without launch.toml: nothing is launched from it.
+    // A directory without launch.toml launches nothing.
   }
   return names;
 }
 
-/// HEALTH of three seconds: it comes once a second.
+/// HEALTH of three seconds; it is published once a second.
 std::vector<health_t> heard_health(const std::string& url) {
   std::vector<health_t> heard;
   HealthListener listener(url, [&](const health_t& health) { heard.push_back(health); });

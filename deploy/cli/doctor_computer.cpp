@@ -47,7 +47,7 @@ Finding tool_finding(const char* subject, const char* command, const char* advic
   return {Verdict::kAdvice, subject, "not found", advice};
 }
 
-/// The directory or, where it is not there yet, the nearest one above it that is.
+/// The directory or, if it does not exist, its nearest existing parent.
 fs::path nearest_existing(fs::path path) {
   std::error_code ignored;
   while (!path.empty() && !fs::exists(path, ignored) && path != path.parent_path())
@@ -102,7 +102,7 @@ Finding receive_buffer_finding() {
   ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &kWantedBufferBytes, sizeof kWantedBufferBytes);
   ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &granted, &size);
   ::close(socket);
-  granted /= 2;  // The kernel reports twice what it gives to data.
+  granted /= 2;  // The kernel reports twice the size for data.
 
   if (granted >= kWantedBufferBytes)
     return {Verdict::kGood, "receive buffer", fmt::format("{} bytes", granted), ""};
@@ -116,7 +116,7 @@ Finding clock_finding() {
   timex clock{};
   const int state = ::adjtimex(&clock);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  // 2020-01-01: a machine that starts without a battery-backed clock believes it is 1970.
+  // 2020-01-01: a machine without a battery-backed clock starts in 1970.
   if (now < std::chrono::seconds(1'577'836'800)) {
     return {Verdict::kAdvice, "clock", "before 2020", "set it: timedatectl set-ntp true"};
   }

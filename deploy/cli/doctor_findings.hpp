@@ -1,4 +1,4 @@
-// What `understory doctor` looks at, and what it makes of it.
+// The checks of `understory doctor` and their findings.
 #pragma once
 
 #include <cstdint>
@@ -11,60 +11,61 @@
 
 namespace understory::cli {
 
-/// How bad something is. kBad must be mended; kAdvice costs something or is for some only.
+/// Severity of a finding. kBad must be corrected; kAdvice is a disadvantage, or applies to some
+/// users only.
 enum class Verdict : std::uint8_t { kGood, kAdvice, kBad };
 
-/// One thing that was looked at.
+/// The result of one check.
 struct Finding {
   Verdict verdict = Verdict::kGood;
   std::string subject;
   std::string text;
-  std::string advice;  ///< The command that mends it, or what to do; empty where nothing.
+  std::string advice;  ///< The command or action that corrects it; empty = none.
 };
 
-/// A line each, the advice below it.
+/// One line for each finding, with its advice below.
 std::string findings_text(const std::vector<Finding>& findings);
 /// `{ok, findings: [{verdict: "ok" | "advice" | "bad", subject, text, advice}]}`.
 nlohmann::ordered_json findings_json(const std::vector<Finding>& findings);
 
-/// The parts of an LCM URL: malformed, not multicast, or leaving this computer (TTL above 0).
+/// Checks an LCM URL: malformed, not multicast, or leaving this computer (TTL above 0).
 std::vector<Finding> url_findings(const std::string& url);
-/// Over which interface a group's packets go, by the text of /proc/net/route; `lo_flags` is the
-/// text of /sys/class/net/lo/flags.
+/// Finds the interface of a group's packets in the text of /proc/net/route; `lo_flags` is the text
+/// of /sys/class/net/lo/flags.
 std::vector<Finding> route_findings(const bus::UdpmUrl& group, const std::string& routes,
                                     const std::string& lo_flags);
-/// A message of our own, sent and received over the real socket; a port that another program keeps
-/// for itself shows here, with its name. To be asked for both groups: that of sweeps is beside.
+/// Sends and receives an own message over the real socket; reports a port that another program has
+/// exclusively, with its name. Call it for both groups, also that of sweeps.
 Finding multicast_finding(const std::string& url);
 
-/// Processors, memory, the processors' governor.
+/// Checks processors, memory and the processors' governor.
 std::vector<Finding> computer_findings();
-/// Of the text of a scaling_governor; empty where the computer has none.
+/// Finding from the text of a scaling_governor; empty if the computer has none.
 Finding governor_finding(const std::string& governor);
-/// What the kernel grants as receive buffer.
+/// Checks the receive buffer granted by the kernel.
 Finding receive_buffer_finding();
-/// Whether the clock is set and synchronised.
+/// Checks that the clock is set and synchronised.
 Finding clock_finding();
-/// How far the clock jumped while `elapsed_us` passed by one that cannot.
+/// Finds a jump of the clock while `elapsed_us` passed on a monotonic clock.
 Finding clock_jump_finding(std::int64_t elapsed_us, std::int64_t by_the_clock_us);
-/// Whether state can be written into this directory (or made there), and how much room there is.
+/// Checks that state can be written into this directory (created if missing), and its free space.
 Finding state_finding(const std::string& directory);
-/// Programs that debugging and pictures need.
+/// Checks the programs needed for debugging and pictures.
 std::vector<Finding> tool_findings();
-/// The processes' programs beside the command: there, able to start, of this version.
+/// Checks the processes' programs beside the command: present, able to start, of this version.
 std::vector<Finding> program_findings(const std::vector<std::string>& names,
                                       const std::string& version);
 
-/// A process of ours on this computer.
+/// An Understory process on this computer.
 struct LocalProcess {
   std::int64_t pid = 0;
   std::string program;  ///< e.g. understory-ekf
 };
-/// Those that run, by /proc.
+/// The running processes, from /proc.
 std::vector<LocalProcess> local_processes();
 
-/// All HEALTH that came in some seconds, and who runs: versions that differ, two of one name,
-/// silent ones, bad states, lost messages, small buffers, sensors from which nothing comes.
+/// Findings from the HEALTH messages of some seconds and the running processes: different versions,
+/// duplicate names, silent processes, bad states, lost messages, small buffers, silent sensors.
 std::vector<Finding> process_findings(const std::vector<health_t>& heard,
                                       const std::vector<LocalProcess>& running,
                                       const std::string& version);

@@ -16,7 +16,7 @@ namespace {
 struct Route {
   std::string interface;
   std::uint32_t destination = 0;  ///< Host byte order.
-  std::uint32_t mask = 0;         ///< Likewise.
+  std::uint32_t mask = 0;         ///< Host byte order.
   int metric = 0;
 
   bool leads_to(std::uint32_t address) const { return (address & mask) == destination; }
@@ -28,7 +28,7 @@ struct Route {
   }
 };
 
-/// Lines of another form are passed over; routes that are down as well.
+/// Lines of another form and routes that are down are skipped.
 std::vector<Route> parse_routes(const std::string& text) {
   std::vector<Route> routes;
   std::istringstream lines(text);

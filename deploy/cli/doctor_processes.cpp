@@ -23,7 +23,7 @@ using Latest = std::map<std::pair<std::string, std::int64_t>, health_t>;
 void name_findings(const Latest& latest, std::vector<Finding>& findings) {
   std::map<std::string, std::string> pids;
   for (const auto& [key, health] : latest) {
-    if (key.second <= 0) continue;  // The supervisor speaks for one that it gave up.
+    if (key.second <= 0) continue;  // Published by the supervisor for a process that is given up.
     pids[key.first] += fmt::format("{}{}", pids[key.first].empty() ? "" : ", ", key.second);
   }
   for (const auto& [name, list] : pids) {
@@ -60,7 +60,7 @@ void state_findings(const Latest& latest, std::vector<Finding>& findings) {
   }
 }
 
-/// Lost and shed messages, by channel.
+/// Lost and dropped messages, by channel.
 void loss_findings(const Latest& latest, std::vector<Finding>& findings) {
   constexpr double kBadShare = 0.01;
   constexpr std::int64_t kFew = 10;
@@ -89,9 +89,9 @@ void buffer_findings(const Latest& latest, std::vector<Finding>& findings) {
                       "deploy/setup --tune, then start them again"});
 }
 
-/// Channels of sensors of one kind that a process listens to.
+/// Subscribed channels of sensors of one kind.
 struct SensorInputs {
-  bool is_taken = false;  ///< It listens to one of this kind.
+  bool is_taken = false;  ///< The process subscribes one of this kind.
   bool is_heard = false;
 
   void note(const channel_health_t& channel) {
@@ -101,8 +101,8 @@ struct SensorInputs {
   bool is_missing() const { return is_taken && !is_heard; }
 };
 
-/// Sensors' channels on which the first process of the chain hears nothing. Others have inputs of
-/// sensors, too (the viewer, a recorder), and RAW_POSE, which is none.
+/// Sensors' channels without messages at the first process of the chain. Other processes (the
+/// viewer, a recorder) also have inputs of sensors, and RAW_POSE, which is not a sensor's channel.
 void sensor_findings(const Latest& latest, std::vector<Finding>& findings) {
   for (const auto& [key, health] : latest) {
     SensorInputs laser;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kTileM = 5.0;
 
-/// Calls `take` with the message, where the bytes are one.
+/// Calls `take` with the message, if the bytes are valid.
 template <class Message, class Take>
 void with(const io::LogEvent& event, const Take& take) {
   const auto message = wire::decode_message<Message>(event.data);
@@ -85,7 +85,7 @@ void DriveAccuracyCollector::add_map(const io::LogEvent& event) {
   }
 }
 
-/// What processes say about themselves.
+/// Takes HEALTH, LOG and CONFIG of processes.
 void DriveAccuracyCollector::add_words(const io::LogEvent& event) {
   if (event.channel == "HEALTH") {
     with<health_t>(event, [&](const auto& health) {

@@ -5,7 +5,7 @@
 namespace understory::cli {
 namespace {
 
-/// Recorded by a sensor or known from outside the run.
+/// Whether it is a sensor's channel or known from outside of the run.
 bool is_outside(const std::string& channel) {
   return channel == "GROUND_TRUTH" || channel == "TRUTH_LANDMARKS" ||
          model::is_sensor_channel(channel);
@@ -55,7 +55,7 @@ void DriveCounter::take(const io::LogEvent& event) {
 
 void DriveCounter::take(const model::SlamPose& pose) {
   ++counts_.poses_by_status[status_of(pose)];
-  // A mapper that was started anew without its state counts from 0 again.
+  // A mapper restarted without its state counts from 0 again.
   if (reset_counter_ && pose.reset_counter > *reset_counter_)
     counts_.reset_counter_steps += pose.reset_counter - *reset_counter_;
   reset_counter_ = pose.reset_counter;

@@ -1,4 +1,4 @@
-// `understory eval`: the experiments, a program of their own that a vehicle need not have.
+// `understory eval`: the experiments, a separate program that a vehicle does not need.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -12,7 +12,7 @@
 namespace understory::cli {
 namespace {
 
-/// Becomes `understory-eval` with these arguments; comes back only by an error.
+/// Replaces this process by `understory-eval` with these arguments; returns only by an exception.
 [[noreturn]] void become_eval(std::vector<std::string> words) {
   words.insert(words.begin(), find_executable("understory-eval"));
   std::vector<char*> argv;
@@ -31,7 +31,7 @@ namespace {
 void add_eval_command(CLI::App& parent) {
   auto* command = parent.add_subcommand(
       "eval", "Experiments: tables beside published figures, JSON, plots (understory-eval)");
-  command->set_help_flag();  // Theirs, too, is understory-eval's.
+  command->set_help_flag();  // understory-eval has its own help.
   command->prefix_command();
   command->callback([command] { become_eval(command->remaining()); });
 }

@@ -1,4 +1,4 @@
-// `understory export`: the results in a log in formats that other tools read.
+// `understory export`: the results in a log in formats of other tools.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,8 +25,8 @@ struct ExportOptions {
   std::string log;
   std::filesystem::path out;
   std::vector<std::string> formats{"tum", "csv", "g2o"};
-  std::string frame_of;  ///< A map file in whose frame the drive was.
-  bool force = false;    ///< Also where landmarks do not show it.
+  std::string frame_of;  ///< A map file with the frame of the drive.
+  bool force = false;    ///< Export even if landmarks do not confirm the frame.
 };
 
 SlamResults read_results(const std::string& log) {
@@ -47,7 +47,7 @@ void write(const std::filesystem::path& file, const std::string& text) {
   fmt::print("{}\n", file.string());
 }
 
-/// The map of a drive as GeoJSON, at the place of the map that it began with.
+/// The map of a drive as GeoJSON, at the location of the map with which it began.
 void export_geojson(const SlamResults& results, const model::MapReference& reference,
                     const std::filesystem::path& out) {
   const model::WholeMap map = results.map.whole().value();
@@ -63,7 +63,7 @@ void export_geojson(const SlamResults& results, const model::MapReference& refer
     write(out / (layer + ".geojson"), text);
 }
 
-/// Where the frame of a drive lies, from the map that it began with.
+/// Location of a drive's frame, from the map with which it began.
 model::MapReference frame_of_drive(const ExportOptions& options) {
   if (options.frame_of.empty())
     fail(
@@ -76,7 +76,7 @@ model::MapReference frame_of_drive(const ExportOptions& options) {
   return *reference;
 }
 
-/// By the landmarks of the drive's map.
+/// Checks the frame by the landmarks of the drive's map.
 void check_frame(const ExportOptions& options, const SlamResults& results) {
   const map_file::MapFile file(options.frame_of, map_file::Access::kRead);
   require_one_frame({options.log, {results.map.whole().value().landmarks}}, maps_in(file));
@@ -123,7 +123,7 @@ void export_results(const ExportOptions& options) {
                         : export_as(format, results, out);
 }
 
-/// Streams the log: it needs no map in it, and may be of any length.
+/// Streams the log: it may have any length and needs no map.
 void export_messages(const std::string& log, const std::filesystem::path& out) {
   const std::filesystem::path file = mcap_path(log, out);
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());

@@ -1,4 +1,4 @@
-// How a command ends when it cannot do its work.
+// Ends a command that cannot do its work.
 #pragma once
 
 #include <filesystem>

@@ -20,7 +20,8 @@ bool shows_one_frame(const Pairing& pairing, const AlignmentParameters& wanted) 
          pairing.log10_tail <= wanted.max_log10_false_alarm;
 }
 
-/// Of the two maps that have the most in common, as they lie; none where there are no maps.
+/// The pairing of the two maps with the most common landmarks in their present frames; none without
+/// maps.
 std::optional<Pairing> best_pairing(const MapsInFrame& first, const MapsInFrame& second,
                                     const AlignmentParameters& wanted) {
   std::optional<Pairing> best;

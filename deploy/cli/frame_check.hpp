@@ -1,4 +1,4 @@
-// Whether two maps that are said to be in one frame are, by their landmarks.
+// Checks by landmarks that two maps have one frame.
 #pragma once
 
 #include <string>
@@ -11,16 +11,16 @@ namespace understory::cli {
 
 /// The landmarks of maps in one frame.
 struct MapsInFrame {
-  std::string source;  ///< The file, for messages.
+  std::string source;  ///< Name of the file for messages.
   std::vector<std::vector<model::MapLandmark>> maps;
 };
 
 /// All maps of a file.
 MapsInFrame maps_in(const map_file::MapFile& file);
 
-/// Ends the command with numbers unless a map of one has landmarks at the places of those of a map
-/// of the other: as many and as surely as `map merge` wants where somebody says how maps lie.
-/// Linear in the landmarks, for each pair of maps.
+/// Ends the command with numbers unless a map of one has landmarks at the positions of landmarks of
+/// a map of the other, by the limits of `map merge` for a stated relative pose. Linear in the
+/// landmarks, for each pair of maps.
 void require_one_frame(const MapsInFrame& first, const MapsInFrame& second);
 
 }  // namespace understory::cli

@@ -19,7 +19,7 @@ Json geometry_json(const char* type, Json coordinates) {
   return {{"type", type}, {"coordinates", std::move(coordinates)}};
 }
 
-/// East of Greenwich, from 0 to 360: there the date line is a longitude like any other.
+/// Converts to longitudes from 0 to 360, which are continuous at the date line.
 PlacesDeg counted_eastwards(PlacesDeg places) {
   for (Eigen::Vector2d& place : places)
     if (place.x() < 0.0) place.x() += 2.0 * kDateLine_deg;
@@ -36,7 +36,7 @@ Eigen::Vector2d on_date_line(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
   return {kDateLine_deg, a.y() + part * (b.y() - a.y())};
 }
 
-/// West of the date line it has longitude 180, east of it -180.
+/// The date line has longitude 180 on its west side, -180 on its east side.
 Json on_side(const PlacesDeg& places, bool is_west) {
   Json list = Json::array();
   for (Eigen::Vector2d place : places) {
@@ -46,7 +46,7 @@ Json on_side(const PlacesDeg& places, bool is_west) {
   return list;
 }
 
-/// The part of a ring on one side (Sutherland and Hodgman's way with one line).
+/// The part of a ring on one side (Sutherland-Hodgman clipping with one line).
 PlacesDeg part_of_ring(const PlacesDeg& ring, bool is_west) {
   const auto is_inside = [&](const Eigen::Vector2d& p) {
     return (p.x() <= kDateLine_deg) == is_west;

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The number of the map that the mapper will begin with. Reads it as the mapper does.
+/// The number of the map with which the mapper will begin. Reads it like the mapper.
 std::uint32_t number_of_given(const GivenMapOptions& options) {
   const model::WholeMap map =
       geoslam_mapper::read_given_map(options.file, static_cast<int>(options.map_id));
@@ -29,7 +29,7 @@ std::string checksum_in_file(const std::string& file, std::uint32_t map_id) {
   return std::ranges::find(maps, map_id, &map_file::MapSummary::map_id)->checksum;
 }
 
-/// Whether a process has left a state there.
+/// Whether the folder has a process's state.
 bool has_state(const fs::path& folder) {
   if (!fs::is_directory(folder)) return false;
   return std::ranges::any_of(fs::directory_iterator(folder), [](const fs::directory_entry& entry) {

@@ -1,4 +1,4 @@
-// What every command over a log does about one that cannot be read or written.
+// Common handling of logs that cannot be read or written.
 #pragma once
 
 #include <memory>
@@ -10,8 +10,8 @@
 
 namespace understory::cli {
 
-/// `work` on the options, as a callback; an error of a log and Ctrl-C end the command with a line
-/// that names the file. Options have a `file`.
+/// `work` on the options as a callback; an error of a log and Ctrl-C end the command with a line
+/// that has the file. Options have a `file`.
 template <class Options, class Work>
 auto guarded(std::shared_ptr<Options> options, Work work) {
   return [options = std::move(options), work = std::move(work)] {

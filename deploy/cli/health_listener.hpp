@@ -12,21 +12,21 @@
 
 namespace understory::cli {
 
-/// Subscribed to HEALTH on the bus; decodes nothing that is malformed.
+/// Subscribes HEALTH on the bus; skips malformed messages.
 class HealthListener {
  public:
   /// Called with each HEALTH message.
   using Handler = std::function<void(const health_t&)>;
-  /// Throws BusError naming the URL when the bus cannot be joined.
+  /// Throws BusError with the URL where the bus cannot be joined.
   HealthListener(const std::string& lcm_url, Handler handler);
 
-  /// Hears SLAM_POSE, too; `handler` is called with each that decodes.
+  /// Subscribes SLAM_POSE too; `handler` is called with each valid message.
   void hear_poses(std::function<void(const model::SlamPose&)> handler);
 
   int descriptor() const { return bus_.file_descriptor(); }  ///< Readable when a message waits.
-  /// Waits up to `timeout` for one message and handles it; false when none came.
+  /// Waits up to `timeout` for one message and handles it; false when none arrived.
   bool handle(std::chrono::milliseconds timeout);
-  std::uint64_t refused() const { return refused_; }  ///< Messages that were not of the type.
+  std::uint64_t refused() const { return refused_; }  ///< Number of malformed messages.
 
  private:
   bus::LiveBus bus_;

@@ -1,4 +1,4 @@
-// `understory launch`: starts the processes, restarts one that dies, stops them cleanly.
+// `understory launch`: starts the processes, restarts those that die, stops them cleanly.
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/signalfd.h>
@@ -43,7 +43,7 @@ struct LaunchOptions {
   GivenMapOptions map;
 };
 
-/// SIGTERM, SIGINT and SIGHUP as a descriptor, so that they are handled between two steps.
+/// SIGTERM, SIGINT and SIGHUP as a descriptor, so that they are handled between steps.
 class StopSignals {
  public:
   StopSignals() {
@@ -72,7 +72,7 @@ bool selected(const LaunchOptions& options, const std::string& name) {
          std::find(options.only.begin(), options.only.end(), name) != options.only.end();
 }
 
-/// The processes that are to run.
+/// The processes to run.
 std::vector<bus::ProcessEntry> chosen_processes(const LaunchOptions& options) {
   auto entries = bus::read_launch_config(options.config).processes;
   std::erase_if(entries, [&](const auto& entry) { return !selected(options, entry.name); });
@@ -119,7 +119,7 @@ std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options,
   return specs;
 }
 
-/// Whether the processes make files of this name as their saved state.
+/// Whether the name is that of a saved state.
 bool is_state_file(const std::filesystem::directory_entry& entry) {
   static const std::regex pattern(
       R"([A-Za-z0-9_-]+\.(snapshot|journal\.[0-9]+|recovering)(\.new)?(\.damaged)?|given_map\.toml)");
@@ -127,7 +127,7 @@ bool is_state_file(const std::filesystem::directory_entry& entry) {
   return std::regex_match(name, pattern) && (entry.is_symlink() || !entry.is_directory());
 }
 
-/// Deletes saved state and nothing else: the folder may be a link to one that holds more.
+/// Deletes only saved state, because the folder may be a link to one with other files.
 void forget_state(const std::filesystem::path& folder, LaunchReport& report) {
   if (!std::filesystem::exists(folder)) return;
   std::vector<std::filesystem::path> gone;
@@ -147,10 +147,11 @@ void forget_state(const std::filesystem::path& folder, LaunchReport& report) {
                                    folder.string(), others));
 }
 
-/// A directory for each process's state; only under the lock, since others may be using them, and
-/// on a bus that can be heard: a launch that cannot run deletes nothing. Where a directory cannot
-/// be made, its process says so in HEALTH. Throws std::filesystem::filesystem_error where --fresh
-/// cannot delete a state, which would be gone on with.
+/// Makes a directory for each process's state. Call it only under the lock, because others may use
+/// them, and after joining the bus, so that a launch that cannot run deletes nothing. If a
+/// directory cannot be made, its process reports this in HEALTH. Throws
+/// std::filesystem::filesystem_error where --fresh cannot delete a state, which would otherwise be
+/// used.
 void prepare_state(const LaunchOptions& options, const launch::Supervisor& supervisor,
                    LaunchReport& report) {
   for (const auto& process : supervisor.status()) {
@@ -160,7 +161,8 @@ void prepare_state(const LaunchOptions& options, const launch::Supervisor& super
   }
 }
 
-/// Files of the processes that are given the map, with it; or none of an earlier launch.
+/// Writes the layer files of the processes that receive the map, or deletes those of an earlier
+/// launch.
 void prepare_map(const LaunchOptions& options, const std::vector<bus::ProcessEntry>& entries,
                  const std::optional<GivenMapLayers>& given) {
   for (const bus::ProcessEntry& entry : entries) {
@@ -169,13 +171,13 @@ void prepare_map(const LaunchOptions& options, const std::vector<bus::ProcessEnt
     if (given) {
       keep_layer(folder, entry.config, given->layers.at(entry.name), given->checksum);
     } else {
-      std::error_code ignored;  // One that stays is not read.
+      std::error_code ignored;  // A file that remains is not read.
       std::filesystem::remove(layer_file(folder), ignored);
     }
   }
 }
 
-/// With the map's path as every process can use it; none where no map is given.
+/// The layers with an absolute path of the map; none without a given map.
 std::optional<GivenMapLayers> map_layer(const LaunchOptions& options,
                                         const std::vector<bus::ProcessEntry>& entries) {
   if (!options.map.is_given()) return std::nullopt;
@@ -185,7 +187,7 @@ std::optional<GivenMapLayers> map_layer(const LaunchOptions& options,
   return given_map_layers(options.map, std::filesystem::absolute(options.map.file), names);
 }
 
-/// Sleeps until a process ends, a signal or a message comes, or something is due.
+/// Sleeps until a process ends, a signal or a message arrives, or a step is due.
 void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
           const HealthListener& health) {
   std::vector<pollfd> polled{{signals.descriptor(), POLLIN, 0}, {health.descriptor(), POLLIN, 0}};
@@ -196,18 +198,18 @@ void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
   ::poll(polled.data(), polled.size(), static_cast<int>(std::clamp<long>(left, 0, 1000)));
 }
 
-/// Heartbeats distinguish a hang from work. Throws BusError: on a bus that cannot be heard no
-/// process would hear anything either.
+/// Heartbeats distinguish a hang from work. Throws BusError, because on an unusable bus the
+/// processes would receive nothing either.
 HealthListener listen(const LaunchOptions& options, launch::Supervisor& supervisor,
                       LaunchReport& report) {
   return HealthListener(options.lcm_url, [&](const health_t& message) {
-    if (message.pid > 0) report.add(message);  // The others are our own words.
+    if (message.pid > 0) report.add(message);  // Messages with pid 0 are our own.
     supervisor.heartbeat(message.process, static_cast<pid_t>(message.pid), Clock::now());
   });
 }
 
-/// Sweeps travel in a group of their own. Throws BusError where another program keeps its port:
-/// now, not at the first sweep.
+/// Checks the sweeps' own group at the start, not at the first sweep. Throws BusError where another
+/// program has its port exclusively.
 void check_group_of_sweeps(const std::string& lcm_url) {
   const std::string url = bus::complete_lcm_url(lcm_url);
   const std::string sweeps = bus::bulk_lcm_url(url);
@@ -236,7 +238,8 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
       noted = std::move(pids);
     }
 
-    if (supervisor.stopped()) break;  // The note is empty by now: the next launch begins anew.
+    if (supervisor.stopped())
+      break;  // The note is empty now, so the next launch starts from the beginning.
     wait(supervisor, signals, health);
     while (health.handle(std::chrono::milliseconds(0))) {
     }

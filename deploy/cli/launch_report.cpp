@@ -46,12 +46,13 @@ void LaunchReport::add(const health_t& health) {
     case health_t::STATE_OK:
       break;
     default:
-      return;  // It starts or stops: the supervisor reports that.
+      return;  // The supervisor reports starts and stops.
   }
 
   if (latest_.size() >= kMaxProcesses && !latest_.contains(health.process)) return;
 
-  // A process is well until it says otherwise; the words of the first message of a kind are told.
+  // A process counts as OK until it reports a fault; the text of the first message of a kind is
+  // printed.
   std::string& latest = latest_.try_emplace(health.process, "HEALTH OK").first->second;
   if (says == latest) return;
   latest = says;

@@ -1,4 +1,4 @@
-// What happened during a launch: on the terminal as it happens, and as JSON for scripts.
+// Events of a launch: on the terminal, and as JSON for scripts.
 #pragma once
 
 #include <filesystem>
@@ -11,17 +11,17 @@
 
 namespace understory::cli {
 
-/// The events of a launch; the first 10,000 are kept.
+/// The events of a launch; the first 10,000 are stored.
 class LaunchReport {
  public:
   /// `quiet`: print nothing.
   explicit LaunchReport(bool quiet) : quiet_(quiet) {}
-  /// One thing that happened: printed with the time of day, kept for the report.
+  /// Adds an event: printed with the time of day, stored for the report.
   void add(const std::string& process, const std::string& text);
-  /// HEALTH of a process: where its state or the reason for it has changed, that is one thing.
+  /// Takes HEALTH of a process; a change of its state or reason is an event.
   void add(const health_t& health);
   /// Writes {"processes": [{name, state, restarts, last_ending}], "events": [{time, process,
-  /// text}]}. Throws std::runtime_error naming the file.
+  /// text}]}. Throws std::runtime_error with the file.
   void write(const std::filesystem::path& file,
              const std::vector<launch::ProcessStatus>& processes) const;
 
@@ -32,11 +32,12 @@ class LaunchReport {
     std::string text;
   };
   static constexpr std::size_t kMaxEvents = 10'000;
-  static constexpr std::size_t kMaxProcesses = 256;  ///< Anybody can send HEALTH.
+  /// Limit, because any program can send HEALTH.
+  static constexpr std::size_t kMaxProcesses = 256;
 
   bool quiet_;
   std::vector<Event> events_;
-  std::map<std::string, std::string> latest_;  ///< Of each process: what its HEALTH said last.
+  std::map<std::string, std::string> latest_;  ///< Latest state and reason of each process.
 };
 
 }  // namespace understory::cli

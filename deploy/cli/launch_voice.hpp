@@ -1,4 +1,4 @@
-// What `launch` says on the bus: for processes that are given up, which cannot say it themselves.
+// Publishes for `launch` on the bus on behalf of processes that are given up.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +17,14 @@ namespace understory::cli {
 /// HEALTH in the name of processes that are given up, LOG in the name of `launch`.
 class LaunchVoice {
  public:
-  /// Throws BusError naming the URL when the bus cannot be used.
+  /// Throws BusError with the URL where the bus cannot be used.
   explicit LaunchVoice(const std::string& lcm_url);
 
   /// Publishes HEALTH once a second for each process that is given up and does not run: ERROR,
-  /// `given_up`, with how it ended; pid 0, since there is none. LOG tells when a process is given
-  /// up, and when that is over. To be called with every status; cheap.
+  /// `given_up`, its ending, and pid 0. LOG reports when a process is given up, and when this ends.
+  /// Call it with every status; cheap.
   void tell(const std::vector<launch::ProcessStatus>& processes, launch::Clock::time_point now);
-  /// A warning in LOG. `code`: as a reason in HEALTH.
+  /// Publishes a warning in LOG. `code`: like a reason in HEALTH.
   void warn(const std::string& code, const std::string& text);
 
  private:
@@ -33,8 +33,8 @@ class LaunchVoice {
   bus::LiveBus bus_;
   bus::Announcer announcer_;
   std::set<std::string> given_up_;
-  std::map<std::string, std::int64_t> sequences_;  ///< Of HEALTH, by process.
-  std::optional<launch::Clock::time_point> told_;  ///< HEALTH, the last time.
+  std::map<std::string, std::int64_t> sequences_;  ///< Sequence numbers of HEALTH by process.
+  std::optional<launch::Clock::time_point> told_;  ///< Time of the last HEALTH.
 };
 
 }  // namespace understory::cli

@@ -1,4 +1,4 @@
-// `understory log accuracy`: a recorded run against the ground truth recorded beside it.
+// `understory log accuracy`: a recorded run against the ground truth in its log.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>

@@ -26,7 +26,7 @@ struct LogContents {
   io::LogDamage damage;
 };
 
-/// Reads a log from end to end with progress; `visit` gets every event.
+/// Reads a whole log with progress; `visit` gets every event.
 template <class Visit>
 LogContents walk(const std::string& file, const Visit& visit) {
   LogContents contents;
@@ -113,7 +113,7 @@ void info(const std::string& file, bool json) {
   }
 }
 
-/// One line for everything that is wrong with one channel; gives how many lines.
+/// Prints one line for each fault of one channel; returns the number of lines.
 std::size_t print_channel_findings(const std::string& name, const ChannelStatistics& channel) {
   std::size_t findings = 0;
   const auto finding = [&](std::uint64_t count, std::string_view what) {

@@ -8,13 +8,13 @@
 namespace understory::cli {
 namespace {
 
-/// Number of the map that a message is about; 0 where its landmarks do not tell. Maps that became
-/// part of it have smaller numbers.
+/// Number of a message's map; 0 where its landmarks do not determine it. Maps merged into it have
+/// smaller numbers.
 std::uint32_t map_id_of(const std::vector<model::MapLandmark>& landmarks) {
   return landmarks.empty() ? 0 : model::map_of(landmarks.back().id);
 }
 
-/// What is known of these landmarks, ids ascending.
+/// The states of these landmarks, ids ascending.
 std::optional<map_file::StoredExistence> states_of(const std::vector<model::MapLandmark>& landmarks,
                                                    const map_file::StoredExistence& all) {
   map_file::StoredExistence result{all.utime, all.learned, {}};
@@ -26,7 +26,7 @@ std::optional<map_file::StoredExistence> states_of(const std::vector<model::MapL
   return result;
 }
 
-/// Takes out the maps whose landmarks are in a later one.
+/// Removes the maps whose landmarks are in a later one.
 void drop_joined(std::map<std::uint32_t, LogMaps::Found>& maps) {
   std::set<std::uint32_t> joined;
   for (const auto& [map_id, found] : maps) {
@@ -72,7 +72,7 @@ void LogMaps::on_delta(const model::MapDelta& delta) {
 
 void LogMaps::on_update(const model::MapUpdate& update) {
   const bool starts = update.status == model::MapUpdateStatus::kFirstMap;
-  // Of a mapper that began anew, the landmarks of this number are others.
+  // After a restart of the mapper, landmarks of this map number are different ones.
   if (starts) existence_.drop_given_by(update.map_id);
   if (starts || map_id_ == 0) go_to(update.map_id);
   held_.take(update);
@@ -80,7 +80,7 @@ void LogMaps::on_update(const model::MapUpdate& update) {
 }
 
 std::map<std::uint32_t, LogMaps::Found> LogMaps::take() {
-  // The map in use at the end is one, however young it is.
+  // The map in use at the end is always kept.
   is_provisional_ = false;
   keep();
   drop_joined(left_);

@@ -1,4 +1,4 @@
-// The maps that a mapper built in a log.
+// The maps built by a mapper in a log.
 #pragma once
 
 #include <cstdint>
@@ -11,24 +11,24 @@
 
 namespace understory::cli {
 
-/// Follows MAP, MAP_DELTA, SLAM_UPDATE and EXISTENCE_STATE through a log in which a mapper may
-/// begin further maps: each as it was last. A provisional map that gave way to another one is
-/// dropped, as the mapper drops it.
+/// Reads MAP, MAP_DELTA, SLAM_UPDATE and EXISTENCE_STATE of a log in which a mapper may begin
+/// further maps, and returns the last state of each. A provisional map replaced by another one is
+/// dropped, as in the mapper.
 class LogMaps {
  public:
-  /// One map, and how many of its changes are missing in the log.
+  /// One map, and the number of its changes missing in the log.
   struct Found {
     model::WholeMap map;
     std::uint64_t missed = 0;
-    /// The last EXISTENCE_STATE of each of its landmarks, whatever map the message was of: a map
-    /// may have become part of this one. None where no landmark has any.
+    /// The last EXISTENCE_STATE of each of its landmarks, from messages of any map, because a map
+    /// may have been merged into this one. None where no landmark has a state.
     std::optional<map_file::StoredExistence> existence;
   };
 
-  /// Takes one event; channels that do not matter are passed over.
+  /// Takes one event; unused channels are skipped.
   void add(const io::LogEvent& event);
-  /// All maps by their number, once the log is read. A map that became part of a later one is not
-  /// among them: its landmarks are in the later one, with their ids.
+  /// All maps by their number, after reading the log. A map merged into a later one is not
+  /// included: its landmarks are in the later one, with their ids.
   std::map<std::uint32_t, Found> take();
 
  private:
@@ -38,11 +38,11 @@ class LogMaps {
   void on_delta(const model::MapDelta& delta);
   void on_update(const model::MapUpdate& update);
 
-  std::uint32_t map_id_ = 0;  ///< Of the map that is held; 0 = none yet.
+  std::uint32_t map_id_ = 0;  ///< Number of the present map; 0 = none yet.
   bool is_provisional_ = false;
   model::HeldMap held_;
   std::map<std::uint32_t, Found> left_;
-  map_file::NewestExistence existence_;  ///< Of all maps.
+  map_file::NewestExistence existence_;  ///< States of all maps.
 };
 
 }  // namespace understory::cli

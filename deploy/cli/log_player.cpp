@@ -57,7 +57,7 @@ bool LogPlayer::go_to(std::int64_t utime_us, std::int64_t most_us) {
     next_ = reader_->next();
     if (events % kEventsPerLook == 0 && std::chrono::steady_clock::now() > end) return false;
   }
-  // In a log nobody is silent because the log ended: time stands where the scrubber stands.
+  // The end of a log makes no process silent: time is the position of the scrubber.
   run_.scene().look(utime_us);
   return true;
 }

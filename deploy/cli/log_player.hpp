@@ -1,4 +1,4 @@
-// A recorded run, shown at any of its times.
+// Shows a recorded run at any of its times.
 #pragma once
 
 #include <cstdint>
@@ -13,26 +13,27 @@
 
 namespace understory::cli {
 
-/// When the events of a log were recorded.
+/// Time span of a log's events.
 struct LogSpan {
   std::int64_t from_us = 0;
   std::int64_t to_us = 0;
 };
 
-/// First and last time of a log's events; `progress` gets the part done, 0..1, now and then. Throws
-/// io::LogError, also where the log has no events.
+/// First and last time of a log's events; `progress` gets the fraction done, 0..1, repeatedly.
+/// Throws io::LogError, also where the log has no events.
 LogSpan span_of_log(const std::filesystem::path& log, const std::function<void(double)>& progress);
 
-/// Feeds a run with a log's events up to a time. Forward it reads on; back it begins anew.
+/// Feeds a run with a log's events up to a time. Forward it continues to read; backward it
+/// restarts.
 class LogPlayer {
  public:
   /// `run` must outlive it. Throws io::LogError.
   LogPlayer(std::filesystem::path log, viewer::Run& run);
 
-  /// Feeds what was recorded up to `utime_us`, for at most `most_us` of work. True when it is
-  /// there.
+  /// Feeds the events recorded up to `utime_us`, for at most `most_us` of work. True when this time
+  /// is reached.
   bool go_to(std::int64_t utime_us, std::int64_t most_us);
-  /// Messages that were not as their type must be, so far.
+  /// Number of malformed messages so far.
   std::uint64_t refused() const { return refused_; }
 
  private:

@@ -1,4 +1,4 @@
-// `understory log record`: the bus into a log, through the checked receiver.
+// `understory log record`: records the bus into a log, through the checked receiver.
 #include <fmt/format.h>
 #include <poll.h>
 
@@ -18,7 +18,7 @@ namespace {
 
 using RecordClock = std::chrono::steady_clock;
 
-/// While the disk is slow so many messages wait, in at most 256 MiB; then the oldest are lost, and
+/// Messages that may wait for a slow disk, in at most 256 MiB; then the oldest are dropped and
 /// counted.
 constexpr std::size_t kMostWaitingMessages = 100000;
 
@@ -31,7 +31,7 @@ std::optional<std::regex> channel_filter(const std::string& channels) {
   }
 }
 
-/// The groups that are recorded, and the log that they go into.
+/// The recorded groups and their log.
 class Recorder {
  public:
   Recorder(const std::string& file, const RecordOptions& options)
@@ -39,14 +39,14 @@ class Recorder {
         bus_(options.lcm_url, options.sweeps ? bus::Groups::kWithBulk : bus::Groups::kOne) {
     bus_.subscribe_all(kMostWaitingMessages,
                        [this](const bus::BusMessage& message) { write(message); });
-    // Behind the bus: where there is none, no empty file is left.
+    // Created after the bus, so that without a bus no empty file is left.
     writer_.emplace(file,
                     options.force ? io::LogCreation::kGrowingReplace : io::LogCreation::kGrowing);
   }
 
-  /// Writes what waits; false = nothing did.
+  /// Writes the waiting messages; false = none.
   bool write_waiting() {
-    // A bounded number: they may not keep the end waiting.
+    // A bounded number, so that messages cannot delay the end.
     int written = 0;
     while (written < 1000 && bus_.handle_one(0)) ++written;
     return written > 0;
@@ -88,7 +88,7 @@ void record_until(Recorder& recorder, const std::atomic<bool>& is_interrupted) {
     flush_due = RecordClock::now() + kFlushPeriod;
   }
 
-  // What had come before the signal, but a flood is not waited for.
+  // Write the messages received before the signal, for a limited time in a flood.
   const auto end = RecordClock::now() + std::chrono::seconds(1);
   while (RecordClock::now() < end && recorder.write_waiting()) {
   }

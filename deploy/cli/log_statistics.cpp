@@ -15,13 +15,13 @@ namespace {
 constexpr std::int64_t kClockJumpUs = 10'000'000;
 constexpr std::size_t kMostPrograms = 1000;
 
-/// On these channels every process counts for itself.
+/// On these channels every process has its own sequence.
 bool counted_per_process(std::string_view channel) {
   constexpr std::array<std::string_view, 3> kChannels{"HEALTH", "LOG", "CONFIG"};
   return std::find(kChannels.begin(), kChannels.end(), channel) != kChannels.end();
 }
 
-/// Difference of numbers that may be hostile.
+/// Difference of possibly hostile numbers.
 std::int64_t difference(std::int64_t a, std::int64_t b) {
   std::int64_t result = 0;
   return __builtin_sub_overflow(a, b, &result) ? 0 : result;

@@ -1,4 +1,4 @@
-// What a recorded log holds, and what is wrong with it.
+// Contents and faults of a recorded log.
 #pragma once
 
 #include <cstdint>
@@ -16,16 +16,17 @@ namespace understory::cli {
 struct ChannelStatistics {
   std::string type;  ///< Wire type; "?" = none of lcmtypes/, "mixed" = several.
   std::uint64_t events = 0;
-  std::uint64_t bytes = 0;  ///< Of the payloads.
+  std::uint64_t bytes = 0;  ///< Bytes of the payloads.
   std::int64_t first_utime = 0;
   std::int64_t last_utime = 0;
-  std::uint64_t malformed = 0;    ///< Of our types: bytes that are no whole message.
-  std::string last_malformed;     ///< Why the last of them was refused.
-  std::uint64_t lost = 0;         ///< Missing sequence numbers, between the first and the last.
-  std::uint64_t restarts = 0;     ///< Times the sequence went back.
-  std::uint64_t stamps_back = 0;  ///< Times the message's own stamp went back without a restart.
+  std::uint64_t malformed = 0;  ///< For our types: number of malformed messages.
+  std::string last_malformed;   ///< Reason of the last of them.
+  std::uint64_t lost = 0;       ///< Missing sequence numbers, between the first and the last.
+  std::uint64_t restarts = 0;   ///< Number of times the sequence went back.
+  /// Number of times the message's own stamp went back without a restart.
+  std::uint64_t stamps_back = 0;
 
-  /// Mean rate between the first and the last event; 0 of one event.
+  /// Mean rate between the first and the last event; 0 for one event.
   double rate_hz() const;
 };
 
@@ -35,20 +36,24 @@ class LogStatistics {
   /// Takes one event, in the order of the log.
   void add(const io::LogEvent& event);
 
-  /// By channel name.
+  /// Statistics by channel name.
   const std::map<std::string, ChannelStatistics>& channels() const { return channels_; }
-  /// The programs that CONFIG and HEALTH name, with their versions; at most 1000.
+  /// The programs in CONFIG and HEALTH with their versions; at most 1000.
   const std::set<std::pair<std::string, std::string>>& programs() const { return programs_; }
   /// Number of events.
   std::uint64_t events() const { return events_; }
-  std::int64_t first_utime() const { return first_utime_; }  ///< Receive times [us].
-  std::int64_t last_utime() const { return last_utime_; }    ///< Receive times [us].
+  std::int64_t first_utime() const { return first_utime_; }  ///< First receive time [us].
+  std::int64_t last_utime() const { return last_utime_; }    ///< Last receive time [us].
   /// Between the first and the last event.
   double duration_s() const { return 1e-6 * static_cast<double>(last_utime_ - first_utime_); }
   /// Event numbers missing in the log.
   std::uint64_t missing_numbers() const { return missing_numbers_; }
-  std::uint64_t clock_back() const { return clock_back_; }        ///< Receive time went back.
-  std::uint64_t clock_forward() const { return clock_forward_; }  ///< By more than ten seconds.
+  std::uint64_t clock_back() const {
+    return clock_back_;
+  }  ///< Number of times the receive time went back.
+  std::uint64_t clock_forward() const {
+    return clock_forward_;
+  }  ///< Number of steps forward by more than ten seconds.
   /// Longest time without any event.
   double longest_silence_s() const { return 1e-6 * static_cast<double>(longest_silence_us_); }
 

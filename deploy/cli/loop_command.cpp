@@ -1,4 +1,4 @@
-// `understory loop`: loop closures set and taken back by a person, live.
+// `understory loop`: loop closures set and revoked by hand, live.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -21,7 +21,7 @@ namespace {
 using WaitClock = std::chrono::steady_clock;
 using Status = model::LoopResult::Status;
 
-/// The closure is sent again this often until the mapper answers: messages may be lost.
+/// Interval of repetition until the mapper answers, because messages may be lost.
 constexpr std::chrono::milliseconds kAgain{500};
 
 struct LoopOptions {
@@ -38,7 +38,7 @@ struct LoopOptions {
   std::string lcm_url;
 };
 
-/// The same closure has the same number: to say it twice does no harm.
+/// The same closure has the same number, so a repetition is harmless.
 std::uint64_t id_of(const LoopOptions& options) {
   if (options.id != 0) return options.id;
   const std::string text = fmt::format("{} {} {} {} {}", options.from, options.to, options.x_m,
@@ -60,7 +60,7 @@ model::LoopClosure closure_of(const LoopOptions& options) {
   return closure;
 }
 
-/// Sends it until the mapper answers. Throws CLI::RuntimeError where none does.
+/// Sends it until the mapper answers. Throws CLI::RuntimeError without an answer.
 model::LoopResult answer_to(const model::LoopClosure& closure, const LoopOptions& options) {
   bus::LiveBus bus(options.lcm_url);
   std::optional<model::LoopResult> answer;

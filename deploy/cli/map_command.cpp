@@ -73,7 +73,7 @@ nlohmann::ordered_json reference_json(const std::optional<model::MapReference>& 
           {"definition", reference->definition}};
 }
 
-/// What follows --json is no file.
+/// The value of --json must not be a file.
 CLI::Validator no_dash() {
   return {
       [](const std::string& value) { return value == "-" ? "- is no map file" : std::string(); },
@@ -172,7 +172,7 @@ void map_accept(const MapOptions& options) {
   fmt::print("{}: what another program changed is change {} now\n", options.file, number);
 }
 
-/// An empty one where the file has none of this number.
+/// An empty map where the file has none of this number.
 map_file::StoredMap map_or_nothing(const MapFile& file, const std::set<std::uint32_t>& ids,
                                    std::uint32_t id) {
   return ids.contains(id) ? file.read(id) : map_file::StoredMap{};
@@ -197,7 +197,7 @@ nlohmann::ordered_json difference_json(std::uint32_t map_id,
                               {"kept", difference.kept},
                               {"existence", nlohmann::ordered_json::array()}};
   for (const map_file::MovedLandmark& move : difference.moved) {
-    // JSON has no infinity: nothing is known of such a landmark's error.
+    // JSON has no infinity: such a landmark's error is unknown.
     const nlohmann::ordered_json chi2 =
         std::isfinite(move.chi2) ? nlohmann::ordered_json(move.chi2) : nullptr;
     json["moved"].push_back({{"id", move.id}, {"distance_m", move.distance_m}, {"chi2", chi2}});

@@ -1,4 +1,4 @@
-// Parts of `understory map` that have a file of their own.
+// Parts of `understory map` in files of their own.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,27 +11,28 @@
 
 namespace understory::cli {
 
-/// `understory map import`: a table of surveyed landmarks, or the maps in a log, into a map file.
+/// `understory map import`: converts a table of surveyed landmarks, or the maps in a log, into a
+/// map file.
 void add_map_import(CLI::App& map);
-/// `understory map georeference`: where the frame of a file's maps lies on the earth.
+/// `understory map georeference`: sets the location of a file's maps on the earth.
 void add_map_georeference(CLI::App& map);
 /// `understory map export`: maps of a file as CSV and GeoJSON.
 void add_map_export(CLI::App& map);
 
-/// `understory map merge`: two maps that overlap become one.
+/// `understory map merge`: merges two overlapping maps.
 void add_map_merge(CLI::App& map);
-/// `understory map close`: a loop closed in a stored map by a person.
+/// `understory map close`: closes a loop in a stored map by hand.
 void add_map_close(CLI::App& map);
 
-/// Runs `work`; what is wrong with a file ends the command in one line.
+/// Runs `work`; an error of a file ends the command with one line.
 void guarded_map_work(const std::function<void()>& work);
-/// A note for a change that is made now.
+/// A note for a change with the present time.
 map_file::ChangeNote note_now(std::string command, std::string source, std::string text);
 
-/// Why a file cannot be given out as GeoJSON, and what helps.
+/// The message that a file cannot be exported as GeoJSON, with the remedy.
 std::string place_missing(const std::string& file);
 /// The layers of a map as GeoJSON (RFC 7946: longitude and latitude of WGS 84, nine decimals), each
-/// with its name. Layers without a feature are left out, but for landmarks and trajectory. Throws
+/// with its name. Layers without a feature are left out, except landmarks and trajectory. Throws
 /// reference_system::ReferenceError.
 std::vector<std::pair<std::string, std::string>> map_geojson(const map_file::StoredMap& map,
                                                              const model::MapReference& reference);

@@ -1,4 +1,4 @@
-// `understory map export`: maps in formats that other tools read.
+// `understory map export`: maps in formats of other tools.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,10 +23,10 @@ using Json = nlohmann::ordered_json;
 struct MapExportOptions {
   std::string file;
   fs::path out;
-  std::vector<std::string> formats;  ///< Empty: what the file can be given out in.
+  std::vector<std::string> formats;  ///< Empty = all formats possible for the file.
 };
 
-/// Places of a map on the earth.
+/// Converts positions of a map to the earth.
 class Earth {
  public:
   explicit Earth(const model::MapReference& reference)
@@ -66,7 +66,7 @@ Json feature(Json geometry, Json properties) {
           {"properties", std::move(properties)}};
 }
 
-/// What the states of existence say, by landmark.
+/// Existence by landmark, from the states.
 ExistenceById existence_of(const map_file::StoredMap& map) {
   ExistenceById existence;
   if (!map.existence) return existence;

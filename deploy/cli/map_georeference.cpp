@@ -1,4 +1,4 @@
-// `understory map georeference`: where the frame of a file's maps lies on the earth.
+// `understory map georeference`: sets the location of a file's maps on the earth.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,12 +21,12 @@ namespace fs = std::filesystem;
 using map_file::MapFile;
 using reference_system::Placing;
 
-/// Control points that are farther off are wrong, or are of another map [m].
+/// With a larger RMS, control points are wrong or belong to another map [m].
 constexpr double kMostControlRms_m = 1.0;
-/// Fixes under trees are off by some metres.
+/// Fixes under trees have errors of some metres.
 constexpr double kMostFixRms_m = 10.0;
 constexpr std::size_t kMostListedPoints = 20;
-/// A scale that differs by more is spoken of.
+/// A scale that differs from 1 by more is reported.
 constexpr double kOddScale = 1e-3;
 
 struct GeoreferenceOptions {
@@ -36,7 +36,7 @@ struct GeoreferenceOptions {
   std::string like;
   std::string crs;
   std::vector<double> antenna_m{0.0, 0.0};
-  std::uint32_t map_id = 0;  ///< 0: the only one with keyframes.
+  std::uint32_t map_id = 0;  ///< 0 = the only one with keyframes.
   std::optional<double> most_rms_m;
   bool force = false;
   bool replace = false;
@@ -60,7 +60,7 @@ map_file::StoredMap driven_map(const MapFile& file, std::uint32_t map_id) {
   return file.read(driven.front());
 }
 
-/// The worst first.
+/// Prints residuals, the worst first.
 void print_residuals(const NamedPoints& known, const Placing& placing) {
   std::vector<std::size_t> order(placing.residuals_m.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -81,7 +81,7 @@ void print_placing(const NamedPoints& known, const Placing& placing, bool is_lis
   if (known.points.size() == 2)
     fmt::print("two points leave nothing over to check the placing with: a third one would\n");
   if (is_listed) print_residuals(known, placing);
-  // Fixes are too rough to tell of a scale.
+  // Fixes are too inaccurate to determine a scale.
   if (is_listed && std::abs(placing.scale - 1.0) > kOddScale)
     fmt::print(
         "distances between the points are {:.5f} times those of the map, which stays as it "
@@ -89,7 +89,7 @@ void print_placing(const NamedPoints& known, const Placing& placing, bool is_lis
         placing.scale);
 }
 
-/// Root mean square of what counts: of fixes without the wild ones, which place_map() gives little
+/// Root mean square of the residuals; for fixes without outliers, to which place_map() gives little
 /// weight.
 double rms_that_counts_m(const Placing& placing, bool is_by_hand) {
   if (is_by_hand) return placing.rms_m;

@@ -1,4 +1,4 @@
-// `understory map merge`: two maps that overlap become one.
+// `understory map merge`: merges two overlapping maps.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -30,29 +30,29 @@ using map_merge::MergedMaps;
 struct MapMergeOptions {
   fs::path first;
   fs::path second;
-  std::uint32_t first_map = 0;  ///< 0: the only one with landmarks.
+  std::uint32_t first_map = 0;  ///< 0 = the only one with landmarks.
   std::uint32_t second_map = 0;
   fs::path into;
   fs::path out;
   double sigma_m = 0.1;
-  std::string first_at;  ///< An end of the first map; empty: its frame.
+  std::string first_at;  ///< An end of the first map; empty = its frame.
   std::string second_at;
-  SaidPose pose;  ///< Of second_at in first_at.
+  SaidPose pose;  ///< Pose of second_at in first_at.
   bool force = false;
   bool json = false;
 
-  /// One file, two of its maps.
+  /// Whether two maps of one file are merged.
   bool is_one_file() const {
     std::error_code ignored;
     return fs::equivalent(first, second, ignored);
   }
 };
 
-/// What is merged, as it was read. Nothing stays locked while the overlap is looked for.
+/// The maps to merge, as read. The files are not locked during the search for the overlap.
 struct MapsToMerge {
   StoredMap first;
   StoredMap second;
-  std::uint32_t second_id = 0;  ///< As its file has it.
+  std::uint32_t second_id = 0;  ///< Number in its file.
   geometry::SE2 first_T_at;     ///< See MapMergeOptions::first_at.
   geometry::SE2 second_T_at;
   std::vector<map_file::MapSummary> known;  ///< All maps of the first one's file.
@@ -60,7 +60,7 @@ struct MapsToMerge {
   std::optional<model::MapReference> second_reference;
 };
 
-/// By which the georeferences of two files may differ.
+/// Largest difference between the georeferences of two files.
 constexpr double kSamePlace_m = 0.5;
 
 Eigen::Vector2d middle_of(const StoredMap& map) {
@@ -69,7 +69,7 @@ Eigen::Vector2d middle_of(const StoredMap& map) {
   return map.landmarks.empty() ? sum : sum / static_cast<double>(map.landmarks.size());
 }
 
-/// The one that is asked for, or the only one that has landmarks.
+/// The requested map, or the only one with landmarks.
 StoredMap chosen_of(const MapFile& file, std::uint32_t map_id, const char* option) {
   if (map_id != 0) return file.read(map_id);
   std::vector<std::uint32_t> with_landmarks;
@@ -81,7 +81,7 @@ StoredMap chosen_of(const MapFile& file, std::uint32_t map_id, const char* optio
   return file.read(with_landmarks.front());
 }
 
-/// In one file the second map keeps its number; in another one's file it may be taken.
+/// In one file the second map keeps its number; in another file the number may be in use.
 std::uint32_t number_for_second(const MapMergeOptions& options,
                                 const std::vector<map_file::MapSummary>& known,
                                 std::uint32_t map_id) {
@@ -93,7 +93,7 @@ std::uint32_t number_for_second(const MapMergeOptions& options,
   return next;
 }
 
-/// Where an end lies in its map; the map's frame itself where none is named.
+/// Pose of an end in its map; identity where no end is given.
 geometry::SE2 end_in(const MapFile& file, const StoredMap& map, const char* option,
                      const std::string& text) {
   if (text.empty()) return {};
@@ -136,7 +136,7 @@ Eigen::Vector3d sigmas_of(const Alignment& alignment) {
   return Eigen::Vector3d(place(0, 0), place(1, 1), alignment.covariance(2, 2)).cwiseSqrt();
 }
 
-/// Of all landmarks of the merged map.
+/// Share of suspected doubles among all landmarks of the merged map.
 double doubled_pct(const MergedMaps& merged) {
   const std::size_t all = std::max<std::size_t>(1, merged.map.landmarks.size());
   return 100.0 * static_cast<double>(merged.suspected_doubles) / static_cast<double>(all);
@@ -181,7 +181,7 @@ nlohmann::ordered_json merge_json(const MapMergeOptions& options, const Alignmen
           {"written", where.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(where)}};
 }
 
-/// As a change of `file`, unless its maps are no longer those that were read.
+/// Writes the result as a change of `file`, unless its maps have changed since they were read.
 void put_merged(const fs::path& file, const MapsToMerge& read, const MergedMaps& merged,
                 const map_file::ChangeNote& note) {
   MapFile opened(file, map_file::Access::kWrite);
@@ -193,8 +193,8 @@ void put_merged(const fs::path& file, const MapsToMerge& read, const MergedMaps&
   opened.put(std::vector<StoredMap>{merged.map, merged.trajectory}, note);
 }
 
-/// Where the merged map is now; empty = nowhere. A new file is a copy of the first one, its history
-/// included, with one more change.
+/// Writes the merged map; returns its place, empty = not written. A new file is a copy of the first
+/// one including its history, with one more change.
 std::string write_merged(const MapMergeOptions& options, const MapsToMerge& read,
                          const Alignment& alignment, const MergedMaps& merged) {
   if (options.into.empty() && options.out.empty()) return {};
@@ -215,8 +215,8 @@ std::string write_merged(const MapMergeOptions& options, const MapsToMerge& read
   return options.out.string();
 }
 
-/// From what a person says. Forced, it counts as it was said where landmarks do not show it: none
-/// is then in both maps.
+/// Alignment from the stated pose. With --force, the stated pose is used even if landmarks do not
+/// confirm it; then there are no common landmarks.
 Alignment align_as_said(const MapMergeOptions& options, const MapsToMerge& maps,
                         const map_merge::AlignmentParameters& parameters) {
   const geometry::SE2WithCovariance first_T_at{maps.first_T_at, Eigen::Matrix3d::Zero()};
@@ -242,7 +242,7 @@ Alignment align_shown(const MapsToMerge& maps, const map_merge::AlignmentParamet
                           });
 }
 
-/// Landmarks decide; what the files say of their places is compared with that.
+/// Landmarks decide; the files' georeferences are compared with the result.
 void report_references(const MapMergeOptions& options, const MapsToMerge& maps,
                        const Alignment& alignment) {
   if (maps.second_reference && !maps.first_reference)
@@ -285,7 +285,7 @@ void run_map_merge(const MapMergeOptions& options) {
   }
 }
 
-/// The map that is merged into is the first one, whichever was named first.
+/// The target map of the merge becomes the first one, whatever the order on the command line.
 MapMergeOptions settled(MapMergeOptions options) {
   const bool has_ends = !options.first_at.empty() || !options.second_at.empty();
   if ((has_ends || options.force) && !options.pose.is_given())

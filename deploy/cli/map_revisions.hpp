@@ -1,4 +1,4 @@
-// A stored map as it was after each of its changes.
+// The states of a stored map after each of its changes.
 #pragma once
 
 #include <filesystem>
@@ -21,16 +21,16 @@ class MapRevisions {
 
   /// The changes, the oldest first.
   const std::vector<map_file::Change>& changes() const { return changes_; }
-  /// All maps as they were after change `number`. A copy of the file is brought back: O(file).
+  /// All maps after change `number`. A copy of the file is reverted: O(file).
   std::vector<map_file::StoredMap> after(std::uint64_t number) const;
 
  private:
   std::filesystem::path file_;
   std::vector<map_file::Change> changes_;
-  std::filesystem::path folder_;  ///< For copies; removed at the end.
+  std::filesystem::path folder_;  ///< Folder for copies; removed at the end.
 };
 
-/// Puts maps in place of what the scene has.
+/// Replaces the scene's maps.
 void show(const std::vector<map_file::StoredMap>& maps, viewer::Scene& scene);
 
 }  // namespace understory::cli

@@ -20,14 +20,14 @@ namespace {
 using reference_system::Transformation;
 using Rows = std::vector<io::LandmarkRow>;
 
-/// Remarks of one kind that are listed one by one.
+/// Largest number of remarks of one kind that are listed singly.
 constexpr std::size_t kMostRemarks = 10;
 /// A chosen origin is a multiple of this, in metres or in thousandths of a degree.
 constexpr double kOriginStep = 100.0;
 constexpr double kWidest_m = 2e5;
-/// Systems are used beside their areas: Norway's UTM zone 33 for all of the country, 550 km beyond.
+/// Systems are used outside of their areas: UTM zone 33 for all of Norway, 550 km beyond.
 constexpr double kFarOutside_m = 1e6;
-/// A transformation between datums that is known better is not spoken of [m].
+/// A more accurate transformation between datums is not mentioned [m].
 constexpr double kWellKnown_m = 0.01;
 
 void report(const MapTableOptions& options, const std::string& what) {
@@ -67,10 +67,10 @@ io::LandmarkRows rows_of(const MapTableOptions& options, const io::CoordinateUni
   return read;
 }
 
-/// The origin that was given, or one near the middle; in the units of rows.
+/// The given origin, or one near the middle; in the units of rows.
 Eigen::Vector2d origin_for(const MapTableOptions& options, const Rows& rows, bool is_degrees) {
   const auto& given = options.origin;
-  // Degrees are given as people say them: latitude first.
+  // Degrees are given in the usual order: latitude first.
   if (!given.empty())
     return is_degrees ? Eigen::Vector2d(given[1], given[0]) : Eigen::Vector2d(given[0], given[1]);
   Eigen::Vector2d low = rows.front().landmark.position_m;
@@ -83,7 +83,7 @@ Eigen::Vector2d origin_for(const MapTableOptions& options, const Rows& rows, boo
   return (0.5 / step * (low + high)).array().round().matrix() * step;
 }
 
-/// Longitudes behind the date line go on from those before it.
+/// Makes longitudes continuous across the date line.
 void count_on_from_first(Rows& rows) {
   const double first_deg = rows.front().landmark.position_m.x();
   for (io::LandmarkRow& row : rows) {
@@ -92,7 +92,7 @@ void count_on_from_first(Rows& rows) {
   }
 }
 
-/// Rows of a system become metres of the frame.
+/// Transforms rows from a system to metres of the frame.
 void move_into(const MapTableOptions& options, const Transformation& into, double unit_m,
                Rows& rows) {
   for (io::LandmarkRow& row : rows) {
@@ -123,7 +123,7 @@ map_file::StoredMap map_with_rows(const MapTableOptions& options, const Rows& ro
   return map;
 }
 
-/// A table in metres of a frame that nothing places.
+/// A table in metres of a frame without a location.
 MapOfTable map_in_metres(const MapTableOptions& options) {
   Rows rows = rows_of(options, {}).rows;
   report_close_pairs(options, rows);
@@ -154,7 +154,7 @@ MapOfTable map_of_table(const MapTableOptions& options,
   Rows rows = rows_of(options, unit).rows;
   if (system.is_geographic) count_on_from_first(rows);
 
-  // Rows in degrees and in metres become coordinates in the system's own units by one factor.
+  // One factor converts rows in degrees or metres to the system's own units.
   const double unit_m = system.unit;
   const Eigen::Vector2d origin = origin_for(options, rows, system.is_geographic);
   const Eigen::Vector2d in_system =

@@ -11,11 +11,11 @@
 namespace understory::cli {
 namespace {
 
-/// A heading counts by a point so far ahead: 3 mrad there are as much as 3 cm of position.
+/// A heading is weighted by a point this far ahead: 3 mrad there equal 3 cm of position.
 constexpr double kAhead_m = 10.0;
-/// What the world's own frame may fit worse by than the best one, in the median.
+/// Largest excess of the median error in the world's own frame over the best fit.
 constexpr double kSame_m = 0.1;
-/// Positions count as known no better than this [m].
+/// Least sigma of positions [m].
 constexpr double kLeastSigma_m = 0.05;
 constexpr int kFitRounds = 50;
 
@@ -37,8 +37,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// One round of the fit: poses count by their variance, and less where they are off by more than
-/// they state, so that wrong ones pull like right ones at most (Huber).
+/// One round of the fit: poses are weighted by their variance, and less if their error exceeds it,
+/// so that the influence of wrong poses is limited (Huber).
 geometry::SE2 refitted(const std::vector<MapAndWorldPose>& poses,
                        const geometry::SE2& world_T_map) {
   const std::vector<double> errors = errors_m(poses, world_T_map);
@@ -54,7 +54,7 @@ geometry::SE2 refitted(const std::vector<MapAndWorldPose>& poses,
   return alignment.a_T_b();
 }
 
-/// Whether the mapper's configuration names a map to begin with. What cannot be read names none.
+/// Whether the mapper's configuration has a given map; false if it is unreadable.
 bool gives_a_map(const config_t& config) {
   try {
     std::istringstream text(config.toml);

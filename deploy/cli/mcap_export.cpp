@@ -10,7 +10,7 @@
 namespace understory::cli {
 namespace {
 
-/// Channels of the file by topic, made when the first message comes.
+/// Channels of the file by topic, made at the first message.
 class McapTopics {
  public:
   explicit McapTopics(mcap::Writer& writer) : writer_(writer) {}
@@ -39,7 +39,7 @@ class McapTopics {
   }
 
   mcap::Writer& writer_;
-  std::map<std::string, std::uint16_t> schemas_;  ///< By name.
+  std::map<std::string, std::uint16_t> schemas_;  ///< Schema ids by name.
   std::array<Line, foxglove::kTopics> lines_;
 };
 

@@ -1,4 +1,4 @@
-// A log that did not come from the bus: its first event says which program made it.
+// A log that is not from the bus: its first event states the program that made it.
 #pragma once
 
 #include <span>
@@ -11,18 +11,18 @@
 
 namespace understory::cli {
 
-/// Writes a log as io::LcmLogWriter does, whole or not at all, with a CONFIG of the program in
-/// front of the first event, at the time of that.
+/// Writes a log like io::LcmLogWriter, completely or not at all, with a CONFIG of the program
+/// before the first event, at the same time.
 class OriginalLog {
  public:
-  /// `program`: the process of CONFIG, e.g. "understory sim". Throws LogError when the file cannot
+  /// `program`: the process of CONFIG, e.g. "understory sim". Throws LogError where the file cannot
   /// be created.
   OriginalLog(const std::string& file, std::string program)
       : writer_(file), program_(std::move(program)) {}
 
   /// Throws LogError.
   void write(model::Utime utime, std::string_view channel, std::span<const std::uint8_t> data);
-  /// The log takes its name. Throws LogError.
+  /// Gives the log its name. Throws LogError.
   void commit() { writer_.commit(); }
 
  private:

@@ -1,4 +1,4 @@
-// Where the command finds its programs, its configuration and a place for state.
+// Paths of the command's programs, configuration and state.
 #pragma once
 
 #include <filesystem>
@@ -6,9 +6,9 @@
 
 namespace understory::cli {
 
-/// The directory of this executable: its processes lie beside it, built or installed.
+/// The directory of this executable, which also has the processes, built or installed.
 std::filesystem::path executable_directory();
-/// `name` beside this executable if it is there; else `name` unchanged, for PATH.
+/// `name` beside this executable if it exists; else `name` unchanged, for PATH.
 std::string find_executable(const std::string& name);
 /// UNDERSTORY_CONFIG, else the installed configuration, else that of the working tree.
 std::filesystem::path default_config_directory();

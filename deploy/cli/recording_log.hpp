@@ -1,5 +1,5 @@
-// A recording that becomes a log: small messages are kept and written in order of time between the
-// sweeps, which are too large to keep.
+// Converts a recording to a log: small messages are stored and written in order of time between the
+// sweeps, which are too large to store.
 #pragma once
 
 #include <fmt/format.h>
@@ -17,20 +17,21 @@
 
 namespace understory::cli {
 
-/// Writes a log whole or not at all; without commit() nothing is left behind.
+/// Writes a log completely or not at all; without commit() no file is left.
 class RecordingLog {
  public:
-  /// Throws LogError when the file cannot be created.
+  /// Throws LogError where the file cannot be created.
   explicit RecordingLog(const std::string& file) : writer_(file, "understory import") {}
 
-  /// Keeps a message until the log reaches its stamp; those of one stamp in the order of adding.
+  /// Stores a message until the log reaches its stamp; messages of one stamp stay in the order of
+  /// adding.
   template <class Message>
   void add(const std::string& channel, Message message) {
     set_sequence(message, counts_[channel]++);
     small_span_.add(message.utime);
     small_.emplace(message.utime, Event{channel, wire::encode_message(message)});
   }
-  /// Writes what is due before the revolution ends, then the sweep's parts.
+  /// Writes the messages due before the end of the revolution, then the sweep's parts.
   void add_sweep(const std::string& channel, const model::PointSweep& sweep) {
     float last = 0.0F;
     for (const model::SweepPoint& point : sweep.points) last = std::max(last, point.time_s);
@@ -43,13 +44,13 @@ class RecordingLog {
     }
     latest_ = std::max(end, latest_);
   }
-  /// Writes the rest; the log takes its name.
+  /// Writes the rest and gives the log its name.
   void commit() {
     while (!small_.empty()) write_first();
     writer_.commit();
   }
-  /// Throws io::DataError where sweeps and other messages have no time in common: their clocks are
-  /// not the same.
+  /// Throws io::DataError where the times of sweeps and other messages do not overlap: they have
+  /// different clocks.
   void require_common_time() const {
     if (!sweep_span_.overlaps(small_span_))
       throw io::DataError(
@@ -101,7 +102,7 @@ class RecordingLog {
       first = std::min(first, utime);
       last = std::max(last, utime);
     }
-    /// Also where one of them has none.
+    /// True also where one of them is empty.
     bool overlaps(const Span& other) const {
       constexpr model::Utime kApart = 10'000'000;
       const bool is_one_empty = last < first || other.last < other.first;

@@ -1,5 +1,5 @@
-// `understory replay`: chosen stages in one process, a log in, a log out, the same bytes every
-// time.
+// `understory replay`: runs a log through chosen stages in one process; the output has the same
+// bytes every time.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -36,9 +36,9 @@ bool reads_a_sensor(const std::string& name) {
   return std::ranges::find(services, name, &bus::Service::name) != services.end();
 }
 
-/// The processes that the configuration launches, so that one directory has the same effect live
-/// and here, but for other programs and those that read a sensor; both mapping stages where it has
-/// no launch.toml.
+/// The processes launched by the configuration, so that a directory has the same effect live and
+/// here, except other programs and those that read a sensor; both mapping stages without a
+/// launch.toml.
 std::vector<std::string> stages_of(const std::filesystem::path& config) {
   if (!std::filesystem::exists(config / "launch.toml")) return {"keyframer", "geoslam_mapper"};
   std::vector<std::string> names;
@@ -53,7 +53,7 @@ std::vector<std::string> stages_of(const std::filesystem::path& config) {
   return names;
 }
 
-/// The services named, in the order in which data runs through them.
+/// The named services, in the order of the data flow.
 std::vector<bus::Service> chosen_services(const std::vector<std::string>& names) {
   std::vector<bus::Service> chosen;
   std::string known;
@@ -100,7 +100,7 @@ void print(const bus::ReplayReport& report, const ReplayOptions& options) {
   }
 }
 
-/// The path stays as it was given: a log then has the same bytes on every computer.
+/// The path is not changed, so that the log has the same bytes on every computer.
 void lay_map_over(const ReplayOptions& options, bus::ReplayOptions& replay) {
   if (!options.map.is_given()) return;
   std::vector<std::string> names;

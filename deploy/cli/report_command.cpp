@@ -24,7 +24,7 @@ struct ReportOptions {
   std::string out;
 };
 
-/// Where the package `understory` lies: beside a build or an installation.
+/// Folder of the package `understory`: beside a build or an installation.
 std::optional<fs::path> python_folder() {
   const fs::path above = executable_directory().parent_path();
   for (const char* const folder : {"python", "lib/python3/dist-packages"}) {

@@ -6,7 +6,7 @@
 namespace understory::cli {
 namespace {
 
-/// CLI::Range lets NaN pass.
+/// CLI::Range accepts NaN.
 CLI::Validator finite() {
   return {[](const std::string& text) {
             double value = 0.0;

@@ -17,7 +17,7 @@ namespace understory::cli {
 namespace {
 
 constexpr std::string_view kPoles = "poles:";
-/// Of 10 bytes each: a message stays below the 64 KiB of one datagram.
+/// With 10 bytes each, a message stays below the 64 KiB of one datagram.
 constexpr std::size_t kPointsPerMessage = 5900;
 constexpr double kLandmarkReach = 40.0;
 
@@ -223,7 +223,8 @@ void send_readings(sim::SensorDrive& drive, const Publish& publish,
 void write_sensor_log(sim::SensorDrive& drive, const std::string& file,
                       const std::function<void(double)>& progress) {
   OriginalLog writer(file, "understory sim");
-  // A log's events are in the order of their stamps: those of sweeps begin before they are sent.
+  // A log's events are in the order of their stamps: stamps of sweeps are before the time of
+  // sending.
   model::Utime now = 0;
   send_readings(
       drive,

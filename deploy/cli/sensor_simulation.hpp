@@ -1,4 +1,4 @@
-// Simulated drives with real sensors, as messages.
+// Simulated drives with real sensors, converted to messages.
 #pragma once
 
 #include <cstdint>
@@ -19,14 +19,14 @@ struct SensorSimulationOptions {
   std::string world;  ///< See is_sensor_world.
   std::string forest = "intermediate";
   std::string path = "circle";
-  double length_m = 1000.0;  ///< Forest and country; the block has its own.
-  int laps = 1;              ///< Forest and block.
+  double length_m = 1000.0;  ///< For forest and countryside; the block has its own.
+  int laps = 1;              ///< For forest and block.
   std::string lidar = "vlp32";
   bool planar_laser = false;
-  double planar_revolution_s = 0.1;  ///< 0 = all its beams at one instant.
+  double planar_revolution_s = 0.1;  ///< 0 = all beams at one instant.
   double speed_mps = 5.0;
   double standstill_s = 22.0;
-  std::optional<double> gnss_outage_from_s;  ///< Until the end of the drive.
+  std::optional<double> gnss_outage_from_s;  ///< The outage lasts until the end of the drive.
   std::uint64_t seed = 1;
 };
 
@@ -38,15 +38,15 @@ std::vector<std::string> sensor_worlds();
 /// The names of lasers, "none" among them.
 std::vector<std::string> lidar_names();
 
-/// The drive that the options describe. Fails (see failure.hpp) where a name is unknown or a file
+/// The drive described by the options. Fails (see failure.hpp) where a name is unknown or a file
 /// cannot be read.
 sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options);
 
-/// Where messages go: onto the bus or into a log.
+/// Output of messages: the bus or a log.
 using Publish =
     std::function<void(const std::string& channel, model::Utime utime, const wire::Bytes& bytes)>;
 
-/// Readings to messages: RAW_SWEEP (in parts), RAW_SCAN, RAW_IMU, RAW_WHEELS, RAW_GNSS,
+/// Converts readings to messages: RAW_SWEEP (in parts), RAW_SCAN, RAW_IMU, RAW_WHEELS, RAW_GNSS,
 /// GROUND_TRUTH.
 class SensorPublisher {
  public:
@@ -62,7 +62,7 @@ class SensorPublisher {
   std::uint64_t sweep_parts_ = 0;
 };
 
-/// When a reading is complete and can be sent [us].
+/// Time at which a reading is complete and can be sent [us].
 model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive);
 
 /// Sends every reading in the order in which real sensors would give it, true landmarks first.
@@ -76,7 +76,8 @@ void send_readings(sim::SensorDrive& drive, const Publish& publish,
 void write_sensor_log(sim::SensorDrive& drive, const std::string& file,
                       const std::function<void(double)>& progress);
 
-/// Trunks, poles and corners within 40 m of the path: what a map can hold. Ids count trunks first.
+/// Trunks, poles and corners within 40 m of the path, which a map can contain. Ids number trunks
+/// first.
 truth_landmarks_t true_landmarks_on_path(const sim::SensorDrive& drive);
 
 }  // namespace understory::cli

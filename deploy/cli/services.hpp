@@ -7,9 +7,9 @@
 
 namespace understory::cli {
 
-/// Every service but the sensor services, in the order in which data runs through them.
+/// Every service but the sensor services, in the order of the data flow.
 std::vector<bus::Service> all_services();
-/// Those that read a sensor themselves: they run as processes only; in a replay the log replaces
+/// Services that read a sensor themselves: they run as processes only; in a replay the log replaces
 /// them.
 std::vector<bus::Service> sensor_services();
 

@@ -1,4 +1,4 @@
-// Options of simulated detectors of landmarks: field of view, errors that detections share.
+// Options of simulated detectors of landmarks: field of view, common errors of detections.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -7,12 +7,12 @@
 
 namespace understory::cli {
 
-/// Adds --view-deg, the width of the field of view, its middle ahead. `view_rad` must outlive the
+/// Adds --view-deg, the width of the field of view, centred ahead. `view_rad` must outlive the
 /// command.
 void add_view_option(CLI::App& command, double& view_rad);
 
-/// Adds the options of `shared` to a command that simulates detections of landmarks, in a group of
-/// their own. `shared` must outlive the command.
+/// Adds the options of `shared` to a command that simulates detections of landmarks, in an own
+/// group. `shared` must outlive the command.
 void add_shared_error_options(CLI::App& command, sim::SharedErrorParameters& shared);
 
 }  // namespace understory::cli

@@ -24,12 +24,12 @@ struct ChangesOptions {
   std::string world = "office";
   std::string out;
   bool no_lidar = false;
-  int clear_cut = 0;  ///< Trees; 0: changes by lot instead.
+  int clear_cut = 0;  ///< Number of trees; 0 = random changes instead.
   int copies = 3;
   std::uint64_t seed = 1;
   changes::CourseParameters course;
   changes::DiffParameters diff;
-  double recall = -1.0;  ///< Negative: that of the world's camera.
+  double recall = -1.0;  ///< Negative = that of the world's camera.
   double false_per_frame = -1.0;
 };
 
@@ -46,7 +46,7 @@ changes::CameraParameters camera_of(const ChangesOptions& options, changes::Scen
   return camera;
 }
 
-/// The diff of a copy; the first one has none. Ids of new things differ from copy to copy.
+/// The diff of a copy; the first one has none. Ids of new objects differ from copy to copy.
 changes::Diff diff_of(const changes::Course& course, const ChangesOptions& options, int copy) {
   constexpr changes::ThingId kIdsPerCopy = 10'000;
   if (copy == 0) return {};

@@ -40,8 +40,8 @@ std::vector<std::string> split_by_comma(const std::string& line) {
   return cells;
 }
 
-/// A census with diameters in cm under another name as a table with dbh_m; rows without a diameter
-/// are left out.
+/// Converts a census with diameters in cm under another name to a table with dbh_m; rows without a
+/// diameter are left out.
 std::string with_diameters_in_m(const std::string& text, const StemSimulationOptions& options) {
   std::stringstream lines(text);
   std::string line;
@@ -77,7 +77,7 @@ sim::Forest stem_map_of(const StemSimulationOptions& options) {
   return std::move(result.forest);
 }
 
-/// A table with x_m and y_m, or a TUM trajectory.
+/// Reads a path from a table with x_m and y_m, or from a TUM trajectory.
 std::vector<Eigen::Vector2d> recorded_way(const std::string& file) {
   const std::string text = io::read_whole_file(file);
   if (file.ends_with(".csv")) {

@@ -16,7 +16,7 @@
 namespace understory::cli {
 namespace {
 
-constexpr int kDigits = 9;  ///< Of a number in graph.g2o: a micrometre in a kilometre.
+constexpr int kDigits = 9;  ///< Digits of a number in graph.g2o: a micrometre in a kilometre.
 
 void add_edge(factor_graph::files::G2oWriter& out, const model::Keyframe& keyframe,
               std::size_t index, std::uint64_t landmark_vertex) {

@@ -1,4 +1,4 @@
-// A mapper's output in a log, and the formats in which other tools read it.
+// A mapper's output in a log, and its conversion to formats of other tools.
 #pragma once
 
 #include <map>
@@ -13,31 +13,30 @@
 
 namespace understory::cli {
 
-/// What was said of landmarks' existence, by id.
+/// Existence of landmarks by id.
 using ExistenceById = std::map<model::LandmarkId, model::LandmarkExistence>;
 
 /// The output of the last mapper run in a log.
 struct SlamResults {
-  std::vector<model::SlamPose> poses;  ///< As published live, localised ones.
-  model::HeldMap map;                  ///< By MAP and all that came after it.
+  std::vector<model::SlamPose> poses;  ///< Localised poses as published live.
+  model::HeldMap map;                  ///< From MAP and all later messages.
   std::vector<std::pair<model::Utime, geometry::SE2>>
-      truth;                                           ///< world_T_vehicle, where the log has it.
-  std::map<std::uint64_t, model::Keyframe> keyframes;  ///< By number.
-  std::vector<model::MapUpdate> updates;               ///< Those that were fused.
-  ExistenceById existence;                             ///< As told last.
+      truth;                                           ///< world_T_vehicle, if the log has it.
+  std::map<std::uint64_t, model::Keyframe> keyframes;  ///< Keyframes by number.
+  std::vector<model::MapUpdate> updates;               ///< Updates of fused keyframes.
+  ExistenceById existence;                             ///< Latest values.
 
-  /// Takes one event; channels that do not matter are passed over.
+  /// Takes one event; unused channels are skipped.
   void add(const io::LogEvent& event);
 };
 
-/// "time x y z qx qy qz qw", one pose a line [s, m]: what evo and the TUM tools read.
+/// "time x y z qx qy qz qw", one pose per line [s, m], for evo and the TUM tools.
 std::string to_tum(const std::vector<std::pair<model::Utime, geometry::SE2>>& poses);
-/// The three rows of each pose's 4 x 4 matrix on one line [m]: what evo and the KITTI tools read.
-/// No times; axes as the vehicle has them (x forward, y left, z up), where KITTI's own are a
-/// camera's.
+/// The three rows of each pose's 4 x 4 matrix on one line [m]: for evo and the KITTI tools. Without
+/// times; axes of the vehicle (x forward, y left, z up), whereas KITTI's own are a camera's.
 std::string to_kitti(const std::vector<std::pair<model::Utime, geometry::SE2>>& poses);
-/// Live poses whose true pose the log has, and these true poses, in the same order: KITTI's format
-/// pairs lines. All live poses and no true ones where the log has no truth.
+/// Live poses with a true pose in the log, and these true poses, in the same order, because KITTI's
+/// format pairs lines. Without truth in the log: all live poses and no true ones.
 struct PairedTrajectories {
   std::vector<std::pair<model::Utime, geometry::SE2>> live;
   std::vector<std::pair<model::Utime, geometry::SE2>> truth;
@@ -49,16 +48,16 @@ std::vector<std::pair<model::Utime, geometry::SE2>> live_trajectory(const SlamRe
 /// map_T_base of the map's keyframes, by stamp.
 std::vector<std::pair<model::Utime, geometry::SE2>> keyframe_trajectory(const model::WholeMap& map);
 
-/// One landmark a line, with a heading: id, position, covariance, radius, times seen, probability
-/// that it exists and whether it is in use (1 or 0); the last two are empty where nothing was said.
+/// One landmark per line, with a heading: id, position, covariance, radius, times seen, probability
+/// of existence, and whether it is in use (1 or 0); the last two are empty where unknown.
 std::string landmarks_csv(const model::WholeMap& map, const ExistenceById& existence);
-/// One keyframe a line, with a heading: number, stamp, pose, covariance.
+/// One keyframe per line, with a heading: number, stamp, pose, covariance.
 std::string keyframes_csv(const model::WholeMap& map);
 
 /// The map as a graph for g2o: VERTEX_SE2 for keyframes (their number), VERTEX_XY for landmarks
-/// (numbered behind them, in order of id), EDGE_SE2_XY for every association. An edge's information
-/// is of the landmark in the frame of the keyframe's base; the format cannot hold the correlation
-/// of a keyframe's edges through the base's own uncertainty.
+/// (numbered after them, in order of id), EDGE_SE2_XY for every association. An edge's information
+/// refers to the landmark in the frame of the keyframe's base; the format has no correlation of a
+/// keyframe's edges through the base's own uncertainty.
 std::string to_g2o(const SlamResults& results);
 
 }  // namespace understory::cli

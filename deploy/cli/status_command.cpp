@@ -35,7 +35,7 @@ void listen_until(HealthListener& listener, Clock::time_point end) {
   }
 }
 
-/// What a driver must know comes first, in the words of the viewer's page.
+/// The verdict on the pose is first, in the words of the viewer's page.
 void print(const StatusTable& table, const viewer::Scene& scene, bool json) {
   const auto now = Clock::now();
   const viewer::Verdict verdict = pose_verdict(scene.verdict().value, table);
@@ -61,7 +61,7 @@ void status(const StatusOptions& options) {
   listener.hear_poses([&](const model::SlamPose& pose) { scene.take(pose, clock.wall_us()); });
 
   if (options.once) {
-    // HEALTH comes once a second: everybody who answers has spoken by then.
+    // HEALTH is published once a second: every running process has sent one by then.
     listen_until(listener, Clock::now() + std::chrono::milliseconds(1500));
     scene.look(clock.wall_us());
     print(table, scene, options.json);
@@ -78,7 +78,7 @@ void status(const StatusOptions& options) {
       print(table, scene, options.json);
     }
   } catch (const terminal::Interrupted&) {
-    return;  // Ctrl-C is how this command ends.
+    return;  // Ctrl-C ends this command normally.
   }
 }
 

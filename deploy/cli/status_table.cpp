@@ -58,7 +58,7 @@ void StatusTable::add(const health_t& health, Clock::time_point now) {
   latest_.insert_or_assign(health.process, Entry{health, now});
 }
 
-/// "lost 1, LANDMARKS late 12"; empty where nothing was wrong.
+/// "lost 1, LANDMARKS late 12"; empty = no faults.
 std::string StatusTable::reason_counts(const health_t& health) {
   std::string result;
   for (const auto& reason : health.reasons) {

@@ -14,18 +14,18 @@ namespace understory::cli {
 /// The latest HEALTH of every process.
 class StatusTable {
  public:
-  /// The clock by which a process counts as silent.
+  /// The clock that determines when a process is silent.
   using Clock = std::chrono::steady_clock;
-  /// HEALTH comes once a second: three missed, and the process does not answer.
+  /// HEALTH is published once a second: after three missing ones the process counts as silent.
   static constexpr std::chrono::seconds kSilent{3};
 
   /// Replaces the process's latest message.
   void add(const health_t& health, Clock::time_point now);
   /// True before the first message.
   bool empty() const { return latest_.empty(); }
-  /// How many SLAM_POSE the processes have sent since they started, as they say.
+  /// Number of SLAM_POSE that the processes state to have sent since their start.
   std::int64_t poses_sent() const;
-  /// The table for a terminal, one process a line; texts of the processes are escaped.
+  /// The table for a terminal, one process per line; texts of the processes are escaped.
   std::string text(Clock::time_point now) const;
   /// The same for scripts.
   nlohmann::ordered_json json(Clock::time_point now) const;
@@ -38,11 +38,11 @@ class StatusTable {
     Clock::time_point received;
     bool silent(Clock::time_point now) const { return now - received >= kSilent; }
   };
-  std::map<std::string, Entry> latest_;  ///< By name of the process.
+  std::map<std::string, Entry> latest_;  ///< Latest entry by name of the process.
 };
 
-/// State of the pose: from the poses received; where none was received, from HEALTH. With poses
-/// sent before it is silent, without any it is waiting.
+/// State of the pose: from the poses received; where none was received, from HEALTH. If poses were
+/// sent before, it is silent; without any, it is waiting.
 viewer::Verdict pose_verdict(const viewer::Verdict& heard, const StatusTable& table);
 
 }  // namespace understory::cli

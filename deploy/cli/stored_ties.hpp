@@ -1,4 +1,4 @@
-// What the mapper measured between the submaps that it left in a file.
+// The mapper's measurements between the submaps in a file.
 #pragma once
 
 #include <span>
@@ -7,8 +7,8 @@
 
 namespace understory::cli {
 
-/// From the submaps' payloads. Throws map_closure::ClosureError, naming the submap, where a
-/// payload is not one of method `smoothing`. O(size).
+/// Reads the ties from the submaps' payloads. Throws map_closure::ClosureError with the submap
+/// where a payload is not from method `smoothing`. O(size).
 map_closure::Ties stored_ties(std::span<const model::Submap> submaps);
 
 }  // namespace understory::cli

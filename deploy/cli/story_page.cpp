@@ -41,7 +41,7 @@ void append_events(std::string& page, const story::Story& story, model::Utime st
   }
 }
 
-/// The least and the greatest value, and how it went in a few.
+/// Appends the least and the greatest value, and a few values of the course.
 void append_series(std::string& page, const story::StorySeries& series, model::Utime start) {
   constexpr std::size_t kShown = 10;
   if (series.v.empty()) return;

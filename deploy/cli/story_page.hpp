@@ -7,8 +7,8 @@
 
 namespace understory::cli {
 
-/// The page, with times in seconds since `start` beside the stamps. What is long is told in part:
-/// the first and the last 100 events.
+/// The page, with times in seconds since `start` beside the stamps. Long lists are shortened to the
+/// first and the last 100 events.
 std::string story_page(const story::Story& story, model::Utime start);
 
 }  // namespace understory::cli

@@ -13,7 +13,7 @@ void write_text_file(const std::filesystem::path& file, const std::string& text)
 
 std::string dumped(const nlohmann::ordered_json& json, int indent) {
   std::string text = json.dump(indent, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
-  // DEL is ASCII and needs no escape in JSON; a terminal erases a character at it.
+  // DEL is ASCII and needs no escape in JSON, but a terminal erases a character for it.
   for (std::size_t at = 0; (at = text.find('\x7F', at)) != std::string::npos; at += 6) {
     text.replace(at, 1, "\\u007f");
   }

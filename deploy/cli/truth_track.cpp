@@ -5,7 +5,7 @@
 namespace understory::cli {
 namespace {
 
-/// Between two true poses the motion is taken to be even if they are no further apart [us].
+/// Largest interval between two true poses for interpolation [us].
 constexpr model::Utime kLongestGap = 200'000;
 
 }  // namespace

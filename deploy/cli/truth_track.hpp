@@ -12,12 +12,12 @@ namespace understory::cli {
 /// The poses of GROUND_TRUTH, frame world.
 class TruthTrack {
  public:
-  /// A later one of the same time counts.
+  /// Adds a pose; it replaces an earlier one of the same time.
   void add(model::Utime utime, const geometry::SE2& world_T_vehicle) {
     poses_.insert_or_assign(utime, world_T_vehicle);
   }
-  /// The true pose at `utime`, between two that are at most 0.2 s apart by an even motion; none
-  /// elsewhere. O(log n).
+  /// The true pose at `utime`, interpolated between two poses at most 0.2 s apart; none elsewhere.
+  /// O(log n).
   std::optional<geometry::SE2> at(model::Utime utime) const;
 
  private:

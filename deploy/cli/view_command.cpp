@@ -42,7 +42,7 @@ std::int64_t monotonic_us() {
       .count();
 }
 
-/// Until Ctrl-C: `step` says what is added to the headers of the frames.
+/// Runs until Ctrl-C: `step` returns additions to the headers of the frames.
 template <class Step>
 void serve(PageHost& host, Step step) {
   fmt::print("{}   (Ctrl-C ends)\n", host.url());
@@ -55,17 +55,17 @@ void serve(PageHost& host, Step step) {
       ::poll(&file, 1, kTick_ms);
     }
   } catch (const terminal::Interrupted&) {
-    return;  // Ctrl-C is how this command ends.
+    return;  // Ctrl-C ends this command normally.
   }
 }
 
-/// Time within the logs: plays, stands, jumps.
+/// Time within the logs: plays, pauses, jumps.
 class Playback {
  public:
   Playback(const LogSpan& span, double rate, bool is_playing)
       : span_(span), at_us_(span.from_us), rate_(rate), is_playing_(is_playing) {}
 
-  /// Takes what a page asks for.
+  /// Takes a page's request.
   void take(const nlohmann::json& control) {
     if (control.contains("seek") && control["seek"].is_number())
       at_us_ = std::clamp(static_cast<std::int64_t>(control["seek"].get<double>()), span_.from_us,
@@ -78,7 +78,7 @@ class Playback {
       rate_ = std::clamp(play["rate"].get<double>(), 0.01, 1000.0);
     if (is_playing_ && at_us_ >= span_.to_us) at_us_ = span_.from_us;
   }
-  /// Time passes. Where the logs are not there yet, it waits for them.
+  /// Advances the time; waits if the logs have not reached it yet.
   void advance(std::int64_t passed_us, bool is_there) {
     if (!is_playing_ || !is_there) return;
     at_us_ = std::min(span_.to_us,
@@ -210,7 +210,7 @@ void view(const ViewOptions& options) {
   } catch (const terminal::Interrupted&) {
     return;
   } catch (const std::runtime_error& error) {
-    // The log, the map or the port; each names itself.
+    // Error of the log, the map or the port; the text names it.
     fail(error.what());
   }
 }

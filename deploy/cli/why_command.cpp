@@ -1,4 +1,4 @@
-// `understory why landmark|pose`: what the messages of a log say of one landmark or one pose.
+// `understory why landmark|pose`: the messages of a log on one landmark or one pose.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -37,7 +37,7 @@ std::optional<Number> whole_number(std::string_view text) {
   return number;
 }
 
-/// The id as messages have it, or "map:number".
+/// The id as in messages, or "map:number".
 model::LandmarkId landmark_id_of(const std::string& text) {
   if (const auto id = whole_number<std::int64_t>(text)) return static_cast<model::LandmarkId>(*id);
   const std::size_t colon = text.find(':');
@@ -51,7 +51,7 @@ model::LandmarkId landmark_id_of(const std::string& text) {
   wrong_usage(fmt::format("landmark {}: no id; it is a whole number, or MAP:NUMBER", text));
 }
 
-/// What was asked for; `seconds` where it was given with a decimal point.
+/// The requested pose; `seconds` if it was given with a decimal point.
 struct PoseWish {
   story::PoseQuestion question;
   std::optional<double> seconds;
@@ -72,13 +72,14 @@ PoseWish pose_wish_of(const std::string& text) {
       text));
 }
 
-/// Seconds as the page shows them, from the log's first stamp; above 10^8 (1973) since the epoch.
+/// The stamp of seconds as on the page, from the log's first stamp; above 10^8 (1973) since the
+/// epoch.
 model::Utime stamp_of(double seconds, model::Utime start) {
   const auto microseconds = static_cast<model::Utime>(std::llround(1e6 * seconds));
   return seconds >= 1e8 ? microseconds : start + microseconds;
 }
 
-/// A log as the book has it, and what of it could not be read.
+/// A log in the book, and its unreadable parts.
 struct ReadLog {
   story::StoryBook book{story::Limits::of_a_log()};
   io::LogDamage damage;
@@ -99,7 +100,7 @@ std::unique_ptr<ReadLog> read_story(const std::string& file) {
   return log;
 }
 
-/// What may be missing in the story because it is missing in the log.
+/// Adds remarks on gaps of the log that may affect the story.
 void add_faults(story::Story& story, const ReadLog& log) {
   if (log.damage.places > 0) {
     story.facts.emplace_back(

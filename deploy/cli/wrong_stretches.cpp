@@ -9,12 +9,12 @@
 namespace understory::cli {
 namespace {
 
-/// How long a HEALTH message is the latest one; they come once a second.
+/// Duration for which a HEALTH message is valid; it is published once a second.
 constexpr std::int64_t kHealthLasts_us = 1'500'000;
-/// How long a single fault counts in HEALTH.
+/// Duration of a single fault in HEALTH.
 constexpr std::int64_t kFaultLasts_us = 3'000'000;
 constexpr std::string_view kOver = ": over";
-/// Reasons that processes give as conditions, which hold until they are over.
+/// Reasons that are conditions: they last until their end.
 constexpr std::array<std::string_view, 8> kConditions{
     "lost",       "rolled_back",   "diverged",        "withheld",
     "not_stored", "miscalibrated", "noise_misstated", "new_map"};
