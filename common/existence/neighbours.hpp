@@ -8,8 +8,7 @@ namespace understory::existence {
 
 /// Probabilities of common changes of a patch between two passes.
 struct PatchParameters {
-  double cleared = 0.02;     ///< Probability that the patch was cleared (clear-cut, a row of parked
-                             ///< cars that left).
+  double cleared = 0.02;     ///< Probability that the patch was cleared (clear-cut, removed row).
   double gone_in_it = 0.97;  ///< Share of removed points in a cleared patch.
   double occluded = 0.05;    ///< Probability that the patch is hidden from one direction.
   double also_from = 0.2;    ///< Probability for each further direction, if it is hidden from one.

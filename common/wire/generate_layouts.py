@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Writes layouts.cpp: for each .lcm type the table by which common/wire walks its bytes.
+"""Writes layouts.cpp: for each .lcm type the table by which common/wire checks its bytes.
 
-The grammar understood is what lcmtypes/ uses: one struct per file, constants, scalars, arrays of
+It reads the grammar of lcmtypes/: one struct per file, constants, scalars, arrays of
 fixed size, and one dimension of variable size (first, counted by an earlier integer of the same
 struct).
 """
@@ -70,7 +70,7 @@ def element_bytes(types, kind):
 
 
 def in_order(types):
-    """Parts before the types that hold them."""
+    """Sorts types so that members precede the types that contain them."""
     done = []
 
     def visit(name):
