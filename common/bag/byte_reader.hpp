@@ -52,7 +52,7 @@ class ByteReader {
     return {reinterpret_cast<const char*>(taken.data()), taken.size()};
   }
 
-  /// How many bytes were read.
+  /// Number of bytes read.
   std::size_t at() const { return at_; }
   /// Number of remaining bytes.
   std::size_t left() const { return bytes_.size() - at_; }

@@ -39,7 +39,7 @@ class ChunkOrder {
  public:
   /// Loads a chunk by its number; may throw.
   using Load = std::function<LoadedChunk(std::size_t chunk)>;
-  /// Which entries are wanted, by channel.
+  /// Whether entries of a channel are wanted.
   using IsWanted = std::function<bool(std::uint32_t channel)>;
 
   /// `spans`: time span of every chunk, by its number.

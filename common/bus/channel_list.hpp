@@ -55,7 +55,7 @@ class ChannelList {
   std::string summary() const;
   /// A paragraph of --help, one line for each channel.
   std::string help() const;
-  /// How `bound` differs from the list, in one line; empty = it does not.
+  /// The difference between `bound` and the list, in one line; empty = none.
   std::string difference(const std::vector<BoundChannel>& bound) const;
 
  private:

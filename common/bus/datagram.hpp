@@ -23,7 +23,7 @@ struct ShortMessage {
 
 /// A part of a message; views into the datagram.
 struct Fragment {
-  std::uint32_t sequence = 0;             ///< Of the message, counted by its sender.
+  std::uint32_t sequence = 0;             ///< Number of the message, counted by its sender.
   std::uint32_t message_size = 0;         ///< Bytes of the whole payload, at most 2^28.
   std::uint32_t offset = 0;               ///< Offset of this part in it [bytes].
   std::uint16_t number = 0;               ///< Below `count`.

@@ -25,7 +25,7 @@ class LcmGroup {
   /// Sends a message. Precondition: check_publishable() returns none.
   std::optional<wire::Refusal> publish(std::string_view channel,
                                        std::span<const std::uint8_t> bytes);
-  /// As given to the constructor.
+  /// The URL given to the constructor.
   const std::string& url() const { return url_; }
   /// The parts of a udpm:// URL; none for another URL (liblcm receives).
   const std::optional<UdpmUrl>& udpm() const { return udpm_; }

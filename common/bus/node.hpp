@@ -168,7 +168,7 @@ class Node {
   void publish_config(const std::string& toml) { announcer_.config(now(), toml); }
   /// The counts behind HEALTH.
   HealthMonitor& monitor() { return monitor_; }
-  /// As given to the constructor.
+  /// The options given to the constructor.
   const NodeOptions& options() const { return options_; }
   /// Sequence counts of an input. Throws std::logic_error for another channel.
   const SequenceCounts& sequence_counts(std::string_view channel) const;

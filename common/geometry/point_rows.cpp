@@ -34,7 +34,7 @@ PointRows::PointRows(std::span<const Eigen::Vector2d> points, double bin_m)
     return place[a] != place[b] ? place[a] < place[b] : a < b;
   });
 
-  // Where each row begins.
+  // Find the begin of each row.
   for (const std::uint32_t i : indices_) {
     const auto row = static_cast<std::int32_t>(place[i] >> 32U);
     if (rows_.empty() || rows_.back().number != row) {

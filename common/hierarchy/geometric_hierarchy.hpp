@@ -60,7 +60,7 @@ class GeometricHierarchy {
   std::uint32_t polygon_of(std::uint32_t triangle) const { return polygon_of_[triangle]; }
   /// Index of descriptors; keys are polygon indices.
   const DescriptorIndex& index() const { return index_; }
-  /// As given to the constructor.
+  /// The parameters given to the constructor.
   const HierarchyParameters& parameters() const { return parameters_; }
 
  private:

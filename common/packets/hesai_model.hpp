@@ -37,7 +37,7 @@ struct HesaiFormat {
   std::size_t beams = 0;        ///< Beams of a block.
   std::size_t azimuth_at = 0;   ///< Offset of the azimuth in the block.
   std::size_t channels_at = 0;  ///< Offset of the channels in the block.
-  std::size_t channel = 0;      ///< Of one beam: distance, reflectivity and more.
+  std::size_t channel = 0;      ///< Bytes of one beam: distance, reflectivity and more.
   std::size_t tail = 0;         ///< Bytes of the tail, without the UDP sequence number.
   std::size_t time_at = 0;      ///< Offset of the microseconds in the tail.
   std::size_t date_at = 0;      ///< Offset of the UTC date and time in the tail.

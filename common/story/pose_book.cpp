@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kReasonBytes = 200;
 constexpr std::size_t kScansNamed = 64;
-constexpr std::size_t kAllocated = 16;  // What the allocator adds [bytes].
+constexpr std::size_t kAllocated = 16;  // Overhead of the allocator [bytes].
 
 /// Finds the revolution of a part; parts arrive within a few messages.
 LaserRecord* begun(History<LaserRecord>& channel, const model::PointSweep& part) {

@@ -40,7 +40,7 @@ class RestartPolicy {
   void forgive();
   /// Deaths within the window before the last one.
   std::size_t deaths_in_window() const { return deaths_.size(); }
-  /// As given to the constructor.
+  /// The parameters given to the constructor.
   const RestartPolicyParameters& parameters() const { return parameters_; }
 
  private:

@@ -115,7 +115,7 @@ Factor position(VariableId pose, const Eigen::Vector3d& antenna, const Eigen::Ve
 /// pose `variables[0]`, with their joint information.
 struct CondensedFactor {
   std::vector<VariableId> variables;  ///< At least two.
-  Eigen::VectorXd measurement;        ///< Of variables[1..], concatenated [m, rad].
+  Eigen::VectorXd measurement;        ///< Values of variables[1..], concatenated [m, rad].
   Eigen::MatrixXd information;        ///< Inverse covariance of `measurement`.
   Loss loss;
 };

@@ -25,7 +25,7 @@ constexpr int dimension(VariableType type) {
   constexpr std::array<int, 5> dimensions{3, 6, 2, 3, 1};
   return dimensions[static_cast<std::size_t>(type)];
 }
-/// That of a pose3.
+/// Degrees of freedom of a pose3.
 constexpr int kMaxVariableDimension = 6;
 
 /// Numbers of a variable's value:

@@ -52,7 +52,7 @@ class ScanContextMaker {
   /// Standard deviation of a heading [rad] for a query `place_sigma_m` beside the frame: from a
   /// sector's width, and from the displacement of points at half of the range.
   double heading_sigma_rad(double place_sigma_m) const;
-  /// As given to the constructor.
+  /// The parameters given to the constructor.
   const ScanContextParameters& parameters() const { return parameters_; }
 
  private:
