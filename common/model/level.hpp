@@ -42,9 +42,9 @@ class LevelCorrection {
 inline constexpr double kTiltWalk = 0.03;
 inline constexpr double kMostTilt_rad = 0.03;
 
-/// Their real sigma on uneven ground [rad]: 50 mrad after 3 s, 75 mrad after 30 s. Detections state
-/// less, otherwise they would no longer determine the heading, which a constant level error does
-/// not affect.
+/// The same largest sigma for poses [rad]: on uneven ground roll and pitch change by 50 mrad in 3
+/// s, by 75 mrad in 30 s. Detections state less, otherwise they would no longer determine the
+/// heading, which a constant level error does not affect.
 inline constexpr double kMostTiltOfPoses_rad = 0.07;
 
 /// Covariance of (roll, pitch) [rad^2] when no IMU has measured them for `seconds` more.
