@@ -115,8 +115,9 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
   table.add(
       "smoothing.condense_of_range", p.condense_of_range, {0.0, 1000.0}, "",
       "... but at most this multiple of the sensor's range: bends within a stretch are lost.");
-  table.add("smoothing.condense_after_m", p.condense_after_m, {0.0, 10000.0}, "m",
-            "... once the vehicle is this far beyond it, and beyond the sensor's range.");
+  table.add(
+      "smoothing.condense_after_m", p.condense_after_m, {0.0, 10000.0}, "m",
+      "... once the vehicle is so far beyond it, and the stretch is compared with known ground.");
   describe_cuts(p, table);
   table.add("smoothing.hand_over_m", p.hand_over_m, {0.0, 100000.0}, "m",
             "Condensed measurements farther from the vehicle than this are handed over to "

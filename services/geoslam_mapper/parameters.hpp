@@ -46,7 +46,7 @@ struct SmoothingMapperParameters {
   double known_ground_m = 5.0;
   double condense_m = 20.0;
   double condense_of_range = 0.5;
-  double condense_after_m = 50.0;
+  double condense_after_m = 10.0;
   double cut_sparse = 0.0;  ///< Landmarks.
   double cut_dense = 0.0;   ///< Landmarks.
   double cut_turn_rad = 0.0;

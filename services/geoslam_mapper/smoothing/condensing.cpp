@@ -40,7 +40,7 @@ std::size_t Condensing::complete(double range_m, const KnownGround& known_ground
   if (parameters_.condense_m <= 0.0 || waiting_.empty()) return 0;
 
   const double now_m = map.graph.node(map.trajectory.last().node).along_m;
-  const double end_m = now_m - std::max(parameters_.condense_after_m, range_m);
+  const double end_m = now_m - parameters_.condense_after_m;
   const CutPolicy policy = cut_policy(parameters_, range_m);
   const auto size = first_stretch(cut_nodes(policy, end_m, map.graph), policy);
   if (!size) return 0;

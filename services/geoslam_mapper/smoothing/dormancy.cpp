@@ -7,11 +7,11 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// The vehicle drives so far [m] from one look around to the next.
-constexpr double kBetween_m = 10.0;
+/// The vehicle drives so far [m] between two searches for landmarks to wake or to make dormant.
+constexpr double kBetween_m = 5.0;
 /// Landmarks are awake so far [m] beyond the sensor's range, and become dormant so much further.
-constexpr double kAwakeBeyond_m = 30.0;
-constexpr double kDormantBeyond_m = 20.0;
+constexpr double kAwakeBeyond_m = 15.0;
+constexpr double kDormantBeyond_m = 10.0;
 
 /// The dormant ones around a place.
 std::vector<model::LandmarkId> dormant_around(const Eigen::Vector2d& here_m, double radius_m,
