@@ -38,10 +38,10 @@ struct Protocol {
 struct Trial {
   bool has_match = false;  ///< A frame that may be answered was taken within the radius.
   bool has_answer = false;
-  bool is_right = false;     ///< The frame answered was taken within the radius.
-  bool is_accepted = false;  ///< By the recogniser, which knows no truth.
-  double confidence = 0.0;   ///< Decades.
-  double error_m = 0.0;      ///< Of the relative pose, where the answer is right.
+  bool is_right = false;           ///< The frame answered was taken within the radius.
+  bool is_accepted = false;        ///< By the recogniser, which knows no truth.
+  double confidence = 0.0;         ///< Decades.
+  double error_m = 0.0;            ///< Of the relative pose, where the answer is right.
   std::vector<double> residual_m;  ///< Of matched stems, likewise.
   double ms = 0.0;
 };

@@ -16,7 +16,7 @@ struct ReturnDrive {
   double seen_share = 0.64;  ///< Of the trunks; drawn anew for each lap.
   double sigma_m = 0.15;     ///< Of a detection, per axis; a keyframe has eight scans.
   double range_m = 20.0;
-  double blind_share = 0.3;    ///< Of the first lap.
+  double blind_share = 0.3;  ///< Of the first lap.
   int laps = 3;
 };
 
