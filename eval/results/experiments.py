@@ -150,7 +150,7 @@ EXPERIMENTS = (
     _eval("closures", "closures --runs 100 --plantations 4 --seed 1 --jobs 2", 8),
     _eval("gaps", "gaps --seeds 5 --first-seed 801 --jobs 2", 15),
     _eval("mountings", "mountings --drives 9 --faults 23 --sound-drives 40 --first-seed 1001 --jobs 2", 4),
-    _eval("reliability-load-0", f"{RELIABILITY} --drives 14 --jobs 4 --load 0", 16),
+    _eval("reliability-load-0", f"{RELIABILITY} --drives 28 --jobs 4 --load 0", 31),
     _eval("reliability-undelayed", f"{RELIABILITY} --drives 28 --jobs 2 --undelayed", 6),
     _eval("reliability-load-8", f"{RELIABILITY} --drives 2 --load 8", 10),
     _eval("misstated", "misstated --runs 10 --seed 2001", 4),
