@@ -239,6 +239,23 @@ TEST_CASE("A node that is tied by next to nothing does not cut the graph where o
   CHECK(way.graph.marginal(way.last).covariance.isApprox(covariance, 0.05));
 }
 
+TEST_CASE("A closure between frozen nodes is known, and taken out again", "[freezing]") {
+  Way way(31, false);
+  const auto before = way.poses();
+  way.graph.add_closure(5, way.nodes[10], way.nodes[30],
+                        {way.graph.pose(way.nodes[10]).inverse() * way.graph.pose(way.nodes[30]) *
+                             geometry::SE2(0.5, 0.2, 0.0),
+                         Eigen::Vector3d(1e-4, 1e-4, 1e-6).asDiagonal()});
+  way.settle();
+  REQUIRE(way.graph.freeze(std::vector<NodeIndex>(way.nodes.begin() + 8, way.nodes.begin() + 32)));
+  way.settle();
+  REQUIRE(way.graph.has_closure(5));
+  way.graph.take_closure_out(5);
+  way.settle();
+  CHECK_FALSE(way.graph.has_closure(5));
+  CHECK(apart(before, way.poses()) < 2e-3);
+}
+
 TEST_CASE("A frozen graph is the same after a load", "[freezing]") {
   Way way(5, true);
   const std::vector<NodeIndex> middle(way.nodes.begin() + 8, way.nodes.begin() + 32);

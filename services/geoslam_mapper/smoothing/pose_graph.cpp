@@ -241,6 +241,7 @@ void PoseGraph::add_closure(std::uint64_t id, NodeIndex a, NodeIndex b,
 }
 
 void PoseGraph::take_closure_out(std::uint64_t id) {
+  if (frozen_motions_.has_closure(id)) unfreeze();
   const MotionRef ref{false, motion_of(id)};
   const auto [a, b] = ends_of(ref);
   std::erase(edit(a).edit_motions(), ref);
