@@ -16,6 +16,7 @@ namespace {
 [[noreturn]] void become_eval(std::vector<std::string> words) {
   words.insert(words.begin(), find_executable("understory-eval"));
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
