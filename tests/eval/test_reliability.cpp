@@ -162,9 +162,9 @@ TEST_CASE("a launch that takes a while ends what it started, one that hangs is k
   const test::Scratch directory("reliability");
   const std::filesystem::path note = directory.path() / "pid";
   // As `launch` does: another group, which it ends some time after it is asked to.
-  const std::string script = "setsid sleep 600 & c=$!; echo $c > " + note.string() + ".new; mv " +
-                             note.string() + ".new " + note.string() +
-                             "; trap 'sleep 0.3; kill $c; exit' TERM; wait";
+  const std::string script =
+      "trap 'sleep 0.3; kill $c; exit' TERM; setsid sleep 600 & c=$!; echo $c > " + note.string() +
+      ".new; mv " + note.string() + ".new " + note.string() + "; wait";
   {
     Processes processes;
     processes.start({"sh", {"-c", script}, {}});
