@@ -1,4 +1,4 @@
-// The incremental smoother beyond what the mapper uses: space, removal, undo.
+// The incremental smoother beyond what the mapper uses: space, removal, marginalisation, undo.
 #include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 
 #include <Eigen/Dense>
@@ -212,6 +212,92 @@ TEST_CASE("Any sequence of adding, removing and undoing equals the batch solutio
     for (int i = 0; i < 20; ++i) REQUIRE(smoother.update().ok);
     REQUIRE(distance_to_batch(smoother.graph()) < 1e-6);
   }
+}
+
+TEST_CASE("Marginalising a variable of a linear graph leaves the others where they were",
+          "[incremental]") {
+  Random random(3);
+  for (int trial = 0; trial < 20; ++trial) {
+    factor_graph::bayes_tree::IncrementalSmoother smoother(exact());
+    std::vector<VariableId> points;
+    for (int i = 0; i < 12; ++i) {
+      points.push_back(smoother.add_variable(random.vector<3>(2.0)));
+      smoother.add(prior(points.back(), random.vector<3>(2.0), random.information<3>(5.0)));
+    }
+    // A pose that is held fast ties points together linearly.
+    const VariableId pose = smoother.add_variable(Pose3{});
+    smoother.add(prior(pose, Pose3{}, Matrix6(1e3 * Matrix6::Identity())));
+    for (const VariableId point : points) {
+      smoother.add(observation(pose, point, random.vector<3>(1.0), random.information<3>(20.0)));
+    }
+    for (int i = 0; i < 30; ++i) REQUIRE(smoother.update().ok);
+    const auto before = smoother.joint_covariance(std::vector<VariableId>{points[0], pose});
+    const Eigen::Vector3d where = smoother.point3(points[0]);
+    const std::vector<VariableId> gone{points[3], points[7]};
+    REQUIRE(smoother.marginalise(gone));
+    REQUIRE(smoother.update().ok);
+    REQUIRE_FALSE(smoother.graph().contains(points[3]));
+    const auto after = smoother.joint_covariance(std::vector<VariableId>{points[0], pose});
+    REQUIRE((*after - *before).cwiseAbs().maxCoeff() < 1e-9);
+    REQUIRE((smoother.point3(points[0]) - where).norm() < 1e-6);
+  }
+}
+
+TEST_CASE("What a variable knew of its neighbour only by itself goes with it", "[incremental]") {
+  // Exact in floating point: nothing at all is left for the neighbour.
+  factor_graph::bayes_tree::IncrementalSmoother smoother(exact());
+  const VariableId gone = smoother.add_variable(Eigen::Vector2d(0.0, 0.0));
+  const VariableId pose = smoother.add_variable(geometry::SE2());
+  const VariableId point = smoother.add_variable(Eigen::Vector2d(2.0, 1.0));
+  smoother.add(prior(pose, geometry::SE2(), Eigen::Matrix3d(Eigen::Matrix3d::Identity())));
+  smoother.add(observation(pose, point, Eigen::Vector2d(2.0, 1.0),
+                           Eigen::Matrix2d(Eigen::Matrix2d::Identity())));
+  const FactorId only = smoother.add(observation(pose, gone, Eigen::Vector2d(0.0, 0.0),
+                                                 Eigen::Matrix2d(Eigen::Matrix2d::Identity())));
+  REQUIRE(smoother.update().ok);
+  const auto before = smoother.joint_covariance({&pose, 1});
+
+  REQUIRE(smoother.marginalise({&gone, 1}));
+  REQUIRE(smoother.update().ok);
+  REQUIRE_FALSE(smoother.graph().contains(only));
+  REQUIRE((smoother.point2(point) - Eigen::Vector2d(2.0, 1.0)).norm() < 1e-12);
+  const auto after = smoother.joint_covariance({&pose, 1});
+  REQUIRE(after);
+  REQUIRE((*after - *before).cwiseAbs().maxCoeff() < 1e-12);
+}
+
+TEST_CASE("With a fixed lag the graph stays small and the covariance what it would be",
+          "[incremental]") {
+  Random random(4);
+  factor_graph::bayes_tree::IncrementalSmoother whole(exact());
+  factor_graph::bayes_tree::IncrementalSmoother lagging(exact());
+  std::vector<VariableId> all;
+  std::vector<VariableId> window;
+  const Eigen::Matrix3d information = 1e4 * Eigen::Matrix3d::Identity();
+  for (int k = 0; k < 60; ++k) {
+    const geometry::SE2 step(1.0, 0.1 * random.normal(), 0.1 * random.normal());
+    for (auto* const part : {&whole, &lagging}) {
+      auto& poses = part == &whole ? all : window;
+      const geometry::SE2 at = poses.empty() ? geometry::SE2() : part->pose2(poses.back()) * step;
+      poses.push_back(part->add_variable(at));
+      if (poses.size() == 1) {
+        part->add(prior(poses[0], geometry::SE2(), information));
+      } else {
+        part->add(relative(poses[poses.size() - 2], poses.back(), step, information));
+      }
+    }
+    if (window.size() > 5) {
+      REQUIRE(lagging.marginalise({window.data(), 1}));
+      window.erase(window.begin());
+    }
+    REQUIRE(whole.update().ok);
+    REQUIRE(lagging.update().ok);
+    const auto expected = whole.joint_covariance({&all.back(), 1});
+    const auto actual = lagging.joint_covariance({&window.back(), 1});
+    REQUIRE((*expected - *actual).norm() < 1e-9);
+  }
+  REQUIRE(lagging.graph().variable_capacity() < 12);
+  REQUIRE(lagging.graph().factor_capacity() < 24);
 }
 
 TEST_CASE("The three batch methods agree, also with the smoother, under a robust loss",

@@ -70,6 +70,10 @@ class IncrementalSmoother {
   void remove(graph::FactorId id);
   /// Removes a variable with all its factors.
   void remove(graph::VariableId id);
+  /// Takes variables out and leaves their information about their neighbours as one linear factor,
+  /// linearised here. False (and nothing is removed) where the variables' own factors do not
+  /// determine them.
+  bool marginalise(std::span<const graph::VariableId> ids);
 
   /// Announces that the next changes affect this variable and its neighbours: these are eliminated
   /// last, whatever else changes meanwhile. Without this call, the variables of the new factors are

@@ -69,4 +69,9 @@ std::variant<GraphFile, GraphFileError> read_graph(std::string_view text, GraphF
 /// vertices are not considered. Cost: the edges.
 std::optional<GraphFileError> find_untied(const GraphFile& file);
 
+/// g2o text of a graph at its estimates: relative poses and Cartesian observations of points, and
+/// all variables; `skipped` counts the factors that the format has no tag for. Losses are not
+/// written.
+std::string write_g2o(const graph::FactorGraph& graph, int* skipped = nullptr);
+
 }  // namespace understory::factor_graph::files

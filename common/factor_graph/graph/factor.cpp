@@ -171,6 +171,7 @@ int residual_dimension(FactorKind kind) {
     case FactorKind::kStepScalar:
       return 1;
     case FactorKind::kCondensed2:
+    case FactorKind::kLinear:
     case FactorKind::kUser:
       break;
   }
@@ -214,6 +215,7 @@ std::span<const VariableType> variable_types(FactorKind kind) {
       return kObserved2;
     case FactorKind::kPoint3:
       return kObserved3;
+    case FactorKind::kLinear:
     case FactorKind::kUser:
       break;
   }

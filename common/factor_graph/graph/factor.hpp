@@ -30,6 +30,7 @@ enum class FactorKind : std::uint8_t {
   kPriorScalar,  ///< b - z
   kStepScalar,   ///< b_b - b_a
   kCondensed2,   ///< Several poses and points of the plane in the first variable's frame.
+  kLinear,       ///< J (value - base) - b: what a marginalisation leaves.
   kUser,         ///< See UserFactor.
 };
 
@@ -134,7 +135,7 @@ class UserFactor {
 };
 
 /// Residual, and unless null its derivative in the sense of UserFactor, before whitening. `data`:
-/// the measurement. Not for kUser.
+/// the measurement. Not for kLinear and kUser.
 void evaluate(FactorKind kind, const double* data, std::span<const Value* const> values,
               std::span<const VariableType> types, double* residual, double* jacobian);
 /// Rows of the residual; 0 for kinds with a size that depends on the data.

@@ -251,6 +251,7 @@ void evaluate(FactorKind kind, const double* z, std::span<const Value* const> v,
       return position3(z, *v[0], e, j);
     case FactorKind::kCondensed2:
       return condensed2(z, v, types, e, j);
+    case FactorKind::kLinear:
     case FactorKind::kUser:
       return;
   }

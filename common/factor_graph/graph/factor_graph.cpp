@@ -230,6 +230,32 @@ FactorId FactorGraph::add(std::shared_ptr<const UserFactor> factor,
   return FactorId(id);
 }
 
+FactorId FactorGraph::add_linear(std::span<const VariableId> variables,
+                                 const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& right) {
+  check_types(FactorKind::kLinear, variables);
+  int columns = 0;
+  for (const VariableId id : variables) columns += dimension(type(id));
+  require(jacobian.rows() > 0 && jacobian.cols() == columns && right.size() == jacobian.rows() &&
+              jacobian.allFinite() && right.allFinite(),
+          "a linear factor of the wrong size");
+
+  const int id = link(FactorKind::kLinear, {}, variables);
+  FactorRecord& record = factors_.edit(id);
+  record.rows = static_cast<int>(jacobian.rows());
+  const auto values = variables.size() * std::tuple_size_v<Value>;
+  record.measurement_size = static_cast<int>(values);
+  record.data_size = static_cast<int>(values) + record.rows * (columns + 1);
+  record.data = pool_.take(static_cast<std::size_t>(record.data_size));
+
+  double* out = record.data;
+  for (const VariableId one : variables)
+    out = std::copy_n(value(one).data(), value(one).size(), out);
+  out = std::copy_n(jacobian.data(), jacobian.size(), out);
+  std::copy_n(right.data(), right.size(), out);
+  linearise(id);
+  return FactorId(id);
+}
+
 void FactorGraph::remove(FactorId id) {
   require(contains(id), "removal of a factor that does not exist");
   for (const int incidence : incidences_of(index(id))) {

@@ -120,6 +120,9 @@ class FactorGraph {
   FactorId add(const CondensedFactor& factor);
   /// Adds a user-defined factor of these variables, which the graph keeps alive.
   FactorId add(std::shared_ptr<const UserFactor> factor, std::span<const VariableId> variables);
+  /// Adds e = J (x - x_0) - b at the present estimates x_0, rows of J and b whitened; see kLinear.
+  FactorId add_linear(std::span<const VariableId> variables, const Eigen::MatrixXd& jacobian,
+                      const Eigen::VectorXd& right);
   /// Removes a factor. Throws std::invalid_argument where there is none.
   void remove(FactorId id);
   /// Removes a variable without factors. Throws std::invalid_argument where it has some.
@@ -160,7 +163,7 @@ class FactorGraph {
   }
   /// The measurement, see FactorKind.
   std::span<const double> measurement(FactorId id) const;
-  /// The information as it was given, up to rounding. Not of kUser.
+  /// The information as it was given, up to rounding. Not of kLinear and kUser.
   Eigen::MatrixXd information(FactorId id) const;
   /// The factor's loss.
   Loss loss(FactorId id) const { return factors_[index(id)].loss(); }
@@ -220,6 +223,8 @@ class FactorGraph {
   void commit();
   /// Restores the state of the last commit(), exactly; at the cost of the changes.
   void rollback();
+  /// Factors added since the last commit().
+  const std::vector<int>& added_factors() const { return factors_.added(); }
   /// Memory taken from the system for measurements and linearisations [bytes].
   std::size_t bytes() const { return pool_.bytes(); }
 
@@ -242,6 +247,8 @@ class FactorGraph {
   /// Residual (and Jacobian) before the loss, whitened, in the charts.
   void whitened(const FactorRecord& factor, std::span<const int> variables, double* residual,
                 double* jacobian) const;
+  void linear_residual(const FactorRecord& factor, std::span<const int> variables, double* residual,
+                       double* jacobian) const;
   void keep_scales(const FactorRecord& factor, std::span<const int> variables);
 
   storage::JournaledTable<VariableRecord> variables_;

@@ -52,11 +52,63 @@ Eigen::Vector3d rotation_of(const VariableRecord& variable) {
   return Eigen::Vector3d::Zero();
 }
 
+void residual_of_chart(const Value& from, const VariableRecord& to, double* out, double* jacobian) {
+  const int size = dimension(to.type);
+  if (to.type != VariableType::kPose3) {
+    for (int i = 0; i < size; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      out[i] = to.value[at] - from[at];
+    }
+    return;
+  }
+
+  const Pose3 a = pose3_of(from);
+  const Pose3 b = pose3_of(to.value);
+  const Eigen::Vector3d rotation = log_rotation(a.rotation.conjugate() * b.rotation);
+  Map<Eigen::Vector3d>(out, 3) = b.translation - a.translation;
+  Map<Eigen::Vector3d>(out + 3, 3) = rotation;
+  if (jacobian != nullptr) {
+    // Inverse of the right Jacobian: I + [v]x / 2 + ... as the Jacobian of Log.
+    Map<Eigen::Matrix3d>(jacobian, 3, 3) = right_jacobian(rotation).inverse();
+  }
+}
+
 }  // namespace
+
+void FactorGraph::linear_residual(const FactorRecord& factor, std::span<const int> variables,
+                                  double* residual, double* jacobian) const {
+  const double* base = factor.data;
+  const double* j = factor.data + factor.measurement_size;
+  Map<Eigen::VectorXd> e(residual, factor.rows);
+  e = -Map<const Eigen::VectorXd>(j + static_cast<std::ptrdiff_t>(factor.rows) * factor.columns,
+                                  factor.rows);
+  int column = 0;
+  for (const int name : variables) {
+    const VariableRecord& variable = variables_[name];
+    Value from;
+    std::copy_n(base, from.size(), from.data());
+    base += from.size();
+    const int size = dimension(variable.type);
+    Delta step{};
+    Eigen::Matrix3d by_rotation;
+    residual_of_chart(from, variable, step.data(), by_rotation.data());
+    const auto first = static_cast<std::ptrdiff_t>(column) * factor.rows;
+    const Map<const Eigen::MatrixXd> own(j + first, factor.rows, size);
+    e.noalias() += own * Map<const Eigen::VectorXd>(step.data(), size);
+    if (jacobian != nullptr) {
+      Map<Eigen::MatrixXd> out(jacobian + first, factor.rows, size);
+      out = own;
+      if (variable.type == VariableType::kPose3) out.rightCols(3) = own.rightCols(3) * by_rotation;
+    }
+    column += size;
+  }
+}
 
 void FactorGraph::whitened(const FactorRecord& factor, std::span<const int> variables,
                            double* residual, double* jacobian) const {
-  if (factor.kind == FactorKind::kUser) {
+  if (factor.kind == FactorKind::kLinear) {
+    linear_residual(factor, variables, residual, jacobian);
+  } else if (factor.kind == FactorKind::kUser) {
     value_copies_.clear();
     for (const int name : variables) value_copies_.push_back(variables_[name].value);
     users_[static_cast<std::size_t>(factor.user)]->evaluate(value_copies_, residual, jacobian);

@@ -93,6 +93,9 @@ class JournaledTable {
     forget();
   }
 
+  /// Numbers given out since the last commit().
+  const std::vector<int>& added() const { return added_; }
+
  private:
   void forget() {
     saved_ids_.clear();
