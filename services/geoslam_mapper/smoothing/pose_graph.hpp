@@ -72,7 +72,8 @@ class PoseGraph {
   /// Adds a loop closure between two nodes. Its number must be new.
   void add_closure(std::uint64_t id, NodeIndex a, NodeIndex b,
                    const geometry::SE2WithCovariance& a_T_b);
-  /// Removes a closure; it must exist.
+  /// Removes a closure; it must exist. If an end of it is frozen, all frozen nodes return to the
+  /// solved graph.
   void take_closure_out(std::uint64_t id);
   /// Whether the closure is in the graph. It is not if it was removed with a node.
   bool has_closure(std::uint64_t id) const;
